@@ -4,6 +4,7 @@
 pub mod adapters;
 pub mod bake_displacement;
 pub mod cached;
+pub mod calibrate;
 pub mod compare;
 pub mod convert;
 pub mod demo;
@@ -96,6 +97,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Bench(args) => lab::bench::run(args),
         #[cfg(feature = "lab")]
         Command::Study(args) => lab::study::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
         Command::Adapters(args) => adapters::run(args),
         Command::Completions(args) => man::completions(args),
         Command::Man(args) => man::run(args),

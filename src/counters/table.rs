@@ -8,6 +8,8 @@ counters! {
     /// Schedules that the effect's passes were traced by, with `+` between them, the first used first: `chc`, `demand`,
     /// `plain`, `plain-bvh2`, `cut` of frames with a budget. Empty where nothing was traced.
     schedule: Names ["name"] names;
+    /// Methods that answered rays of the effect's passes, with `+` between them. Empty where all were traced.
+    methods: Names ["name"] names, only "with `--secondary`";
     /// Rays generated: `rays_traced` + `rays_answered`. A ray with an empty interval is none.
     rays: u64 ["rays"] = |c| c.rays_traced + c.rays_answered;
     /// Rays that were traced through bricks, if only a part of their way.

@@ -82,6 +82,19 @@ impl Captures {
         Ok(())
     }
 
+    /// What the passes that `is_of` names added to the mean of `samples`, pixel by pixel; nothing where there were
+    /// none.
+    pub fn added(&self, is_of: impl Fn(&str) -> bool, samples: u32) -> Vec<[f32; 3]> {
+        let mut sum: Vec<[f64; 3]> = Vec::new();
+        for effect in self.effects.iter().filter(|effect| is_of(effect.name)) {
+            sum.resize(effect.radiance.len(), [0.0; 3]);
+            for (sum, own) in sum.as_flattened_mut().iter_mut().zip(effect.radiance.as_flattened()) {
+                *sum += own;
+            }
+        }
+        sum.into_iter().map(|rgb| rgb.map(|x| (x / f64::from(samples)) as f32)).collect()
+    }
+
     /// The error of the effect `name` against `exact`, for pictures `width` wide in square tiles of edge `tile`, each
     /// the mean of `samples`. Zero where either lacks the effect.
     pub fn error(&self, exact: &Self, name: &str, width: u32, tile: u32, samples: u32) -> EffectError {

@@ -338,6 +338,7 @@ fn bounce(
     let mut lit = None;
     records.pass(engine, names[0], |r, stats| {
         let plan = methods.plan(r, pass)?;
+        stats.methods.add(&plan.methods);
         let draws = r.draws_environment();
         if plan.is_whole {
             stats.add(r.executor.run(pass, &plan.first(), &r.cache.states)?);
@@ -426,6 +427,7 @@ fn trace_and_add(
     stats: &mut Counters,
 ) -> Result<(), ExecutorError> {
     let plan = methods.plan(engine, pass)?;
+    stats.methods.add(&plan.methods);
     if plan.is_whole {
         let steps = [&plan.first()[..], &[plan.add]].concat();
         stats.add(engine.executor.run(pass, &steps, &engine.cache.states)?);

@@ -5,6 +5,7 @@
 //! [`crate::secondary`]; the frame loop knows this trait and no method.
 
 use super::{Engine, FrameRecords};
+use crate::counters::Names;
 use crate::kernels::View;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Pass, Report, Step};
@@ -29,6 +30,8 @@ pub struct Plan {
     pub add: Step,
     /// Where all rays are answered and their hits are lit: what does that, in place of rays to lamps.
     pub light: Vec<Step>,
+    /// The methods that have a part in this.
+    pub methods: Names,
 }
 
 impl Plan {
@@ -36,7 +39,7 @@ impl Plan {
     pub fn exact(pass: Pass) -> Self {
         let add = if matches!(pass, Pass::Occlusion(_)) { Step::AddOcclusion } else { Step::AddLight };
         let (before, after, light) = (Vec::new(), Vec::new(), Vec::new());
-        Self { generate: Step::Generate, before, is_whole: false, after, add, light }
+        Self { generate: Step::Generate, before, is_whole: false, after, add, light, methods: Names::default() }
     }
 
     /// Makes the rays and runs what comes before tracing.
@@ -59,6 +62,9 @@ pub struct Displaced<'a> {
 
 /// A method of secondary visibility.
 pub trait Secondary: Any {
+    /// What `--secondary` calls it.
+    fn name(&self) -> &'static str;
+
     /// Begins a sample of a frame.
     fn begin(&mut self, _camera: &Camera, _view: &View) {}
 
@@ -153,7 +159,11 @@ impl Methods {
     pub(super) fn plan(&mut self, engine: &mut Engine, pass: Pass) -> Result<Plan, ExecutorError> {
         let mut plan = Plan::exact(pass);
         for method in &mut self.0 {
+            let before = (plan.before.len(), plan.is_whole);
             method.plan(engine, pass, &mut plan)?;
+            if (plan.before.len(), plan.is_whole) != before {
+                plan.methods.push(method.name());
+            }
         }
         Ok(plan)
     }

@@ -95,6 +95,24 @@ impl EffectMethods {
         std::array::from_fn(|i| (EFFECTS[i], methods[i]))
     }
 
+    /// The same, but for an effect, which a method answers.
+    pub fn by(mut self, effect: &str, method: Method) -> Self {
+        *self.method(effect) = method;
+        self
+    }
+
+    /// What answers the rays of an effect here, or of `other` where that is traced.
+    pub fn over(mut self, other: Self) -> Self {
+        for (effect, method) in self.list() {
+            if method != Method::Exact {
+                continue;
+            }
+            let other = other.list().into_iter().find(|(name, _)| *name == effect);
+            *self.method(effect) = other.map_or(method, |(_, method)| method);
+        }
+        self
+    }
+
     fn method(&mut self, effect: &str) -> &mut Method {
         match effect {
             "ao" => &mut self.ao,

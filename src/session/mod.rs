@@ -1,5 +1,6 @@
 //! The front door: open a scene, render frames, trace rays.
 
+pub mod auto;
 pub mod bands;
 pub mod checkpoints;
 pub mod device;

@@ -1,5 +1,6 @@
 //! A scene, opened for frames and for rays.
 
+use super::auto::{Auto, Wanted};
 use super::checkpoints::{Checkpoint, ErrorMeter, References};
 use super::left_out::{self, LeftOut};
 use super::lighting::{Lighting, lighting};
@@ -138,6 +139,8 @@ pub struct Session {
     references: Option<References>,
     /// Renders every frame exactly as well.
     reference: Option<Renderer>,
+    /// Chooses methods, where settings leave that to it.
+    pub(super) auto: Option<Auto>,
     /// What the first frame showed, to be rendered once more.
     first: Option<(Arc<SceneFile>, Light)>,
     pub(super) warnings: Vec<String>,
@@ -181,6 +184,8 @@ impl Session {
         let reference = settings.measure_error.then(|| reference(scene, file, settings, lighting.light.clone()));
         let mut renderer = lit_renderer(opened, settings, lighting.light.clone());
         renderer.captures = settings.measure_error.then(Captures::default);
+        let auto = Auto::new(settings, file, &renderer)?;
+        warnings.extend(auto.as_ref().and_then(Auto::warning));
         Ok(Self {
             file: file.into(),
             given,
@@ -195,6 +200,7 @@ impl Session {
             motion,
             references,
             reference: reference.transpose()?,
+            auto,
             first: None,
             warnings,
         })
@@ -270,7 +276,14 @@ impl Session {
         }
         let meter = self.references.as_ref().map(|references| references.meter(number)).transpose()?;
         let mut metered = Metered { watch, meter: meter.flatten(), failed: None };
-        let output = renderer.frame_watched(number, camera, &self.settings.checkpoints, &mut metered);
+        let (checkpoints, frames) = (&self.settings.checkpoints[..], self.settings.frames);
+        let output = match &mut self.auto {
+            Some(auto) => {
+                let wanted = Wanted { number, camera, path: &self.path, frames, checkpoints };
+                auto.frame(renderer, &wanted, &mut metered)
+            }
+            None => renderer.frame_watched(number, camera, checkpoints, &mut metered),
+        };
         let Metered { meter, failed, .. } = metered;
         if let Some(error) = failed {
             return Err(error).with_context(name);
@@ -281,7 +294,7 @@ impl Session {
         };
         let checkpoints = meter.map_or_else(Vec::new, ErrorMeter::finish);
         if is_first {
-            let has_maps = self.settings.secondary.ao != Method::Exact;
+            let has_maps = !matches!(self.settings.secondary.ao, Method::Exact | Method::Auto);
             self.warnings.extend(short_rays(renderer).filter(|_| has_maps).into_iter().chain(dark_lamps(renderer)));
         }
         if let Some(reference) = &mut self.reference {

@@ -9,11 +9,12 @@ use crate::schedule::Tracing;
 use crate::schedule::auto::Auto;
 #[cfg(feature = "lab")]
 use crate::schedule::fronts::Fronts;
-use crate::secondary::Method;
 #[cfg(feature = "lab")]
 use crate::secondary::df::answer::Df;
 use crate::secondary::displacement::{Displacement, Library};
+use crate::secondary::roma::RomaSettings;
 use crate::secondary::roma::answer::Roma;
+use crate::secondary::{EffectMethods, Method};
 use crate::session::Settings;
 use crate::settings::{Length, Schedule};
 use anyhow::Result;
@@ -61,17 +62,26 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
 
 /// The methods that answer secondary rays of a scene; a field of visibility is made or read later.
 pub fn methods(settings: &Settings, resident: &Resident) -> Methods {
+    methods_of(std::slice::from_ref(settings), resident)
+}
+
+/// The same of several settings, which differ in what answers which effects: the first of them that has a method for an
+/// effect counts.
+pub fn methods_of(parts: &[Settings], resident: &Resident) -> Methods {
     let mut methods = Methods::default();
-    let (roma, chosen) = (&settings.roma, settings.secondary);
-    if chosen.has(Method::Roma) || chosen.has(Method::Sift) {
-        methods.set(Roma::new(roma.settings(settings.rsm.settings(), chosen), roma.bom));
+    let chosen = parts.iter().fold(EffectMethods::EXACT, |all, part| all.over(part.secondary));
+    let with = |method| parts.iter().find(move |part| part.secondary.has(method));
+    if let Some(first) = with(Method::Roma).or(with(Method::Sift)) {
+        let of = |part: &Settings| part.roma.settings(part.rsm.settings(), part.secondary);
+        let all = parts.iter().map(of).reduce(RomaSettings::or).unwrap_or_else(|| of(first));
+        methods.set(Roma::new(all, first.roma.bom));
     }
     #[cfg(feature = "lab")]
-    if chosen.has(Method::Df) {
-        methods.set(Df::new(settings.df.clone(), chosen, roma.bom));
+    if let Some(part) = with(Method::Df) {
+        methods.set(Df::new(part.df.clone(), chosen, part.roma.bom));
     }
-    if chosen.has(Method::Displacement) {
-        methods.set(Displacement::new(settings.displacement.clone(), chosen, Library::of(resident)));
+    if let Some(part) = with(Method::Displacement) {
+        methods.set(Displacement::new(part.displacement.clone(), chosen, Library::of(resident)));
     }
     methods
 }

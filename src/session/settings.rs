@@ -10,8 +10,8 @@ use crate::secondary::df;
 use crate::secondary::{EffectMethods, Method, displacement, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
-    Adapter, CacheSize, Direction, EffectList, Entry, Environment, FrameBudget, Group, HostCacheSize, ImageSize,
-    Length, Plane, Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
+    Adapter, CacheSize, Direction, EffectList, Entry, Environment, ErrorLimit, FrameBudget, Group, HostCacheSize,
+    ImageSize, Length, Plane, Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
 };
 use std::path::PathBuf;
 
@@ -199,13 +199,22 @@ settings! {
         /// --fronts on: multi-queries, tighter-bounds, lazy-requery, pull-up. docs/methods/chc.md says what each does.
         without: Vec<Optimisation> = Vec::new(), "--without LIST", Rule::Any, "", Schedule, Expert;
 
-        /// How secondary rays are answered: exact, roma, auto, df, dvf, displacement, or by effect: ao=roma. `exact`:
-        /// all are traced. `roma`: those of `ao` and `diffuse` by occupancy maps, with a bias of a few cells and
-        /// without a brick loaded. `auto`: those of `ao` that the maps find free are not traced. `df`: those of `ao` by
+        /// How secondary rays are answered: exact, roma, auto, sift, df, dvf, displacement, or by effect: ao=roma.
+        /// `exact`: all are traced. `auto`: by whatever is fastest on this device within --error, by the rates that
+        /// `brickwalk calibrate` has measured; else traced. `roma`: those of `ao` and `diffuse` by occupancy maps, with
+        /// a bias of a few cells and without a brick loaded. `sift`: those of `ao` that the maps find free are not
+        /// traced. `df`: those of `ao` by
         /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
         /// walk. `displacement`: by what `bake-displacement` has put into the scene file, mostly rays against bricks
         /// that are not resident. Rays of `shadow` are traced unless asked: shadow=roma.
         secondary: EffectMethods = EffectMethods::EXACT, "--secondary METHOD", Rule::Any, "", Methods, Common;
+        /// With --secondary auto: the error that methods may have, as a mean FLIP, 0.05, or as a percentage, 5%. FLIP
+        /// is that of the picture against the exact one of the same rays, a percentage 100 times the root of an
+        /// effect's relMSE. The first of every 32 frames is rendered exactly as well and measures it.
+        error: ErrorLimit = ErrorLimit::Percent(5.0), "--error FLIP|P%", Rule::Any, "", Methods, Usual;
+        /// With --secondary auto: the file of rates that `brickwalk calibrate` has written. [default: rates.json in the
+        /// user's folder for settings, or in BRICKWALK_CONFIG_DIR]
+        rates: Option<PathBuf> = None, "--rates FILE", Rule::Any, "", Methods, Expert;
 
         /// Measure the error of frames after so many samples per pixel, as 1,4,16,64. `--reference` is what they are
         /// measured against; `checkpoints.jsonl` and the report have RMSE, relMSE, bias and FLIP over samples and over
@@ -328,15 +337,22 @@ impl Settings {
         Ok(())
     }
 
+    /// What answers which effects. `auto` with `--auto-error` or `--auto-one-in` is an old form of `sift`.
+    pub fn methods(&self) -> EffectMethods {
+        let (own, usual) = (&self.roma, crate::secondary::roma::Options::default());
+        let is_old = (own.error, own.one_in) != (usual.error, usual.one_in);
+        if is_old { self.secondary.with(Method::Auto, Method::Sift) } else { self.secondary }
+    }
+
     /// Settings that were chosen and have no effect, a line each: what they belong to is not on.
     pub fn without_effect(&self) -> Vec<String> {
         let effects = self.effects;
-        let chosen = self.secondary;
+        let chosen = self.methods();
         let by_maps = |method| matches!(method, Method::Roma | Method::Sift);
         let maps = chosen.has(Method::Roma) || chosen.has(Method::Sift);
         let fields = chosen.list().iter().any(|(_, method)| method.name() == "df");
         let lit = self.environment.is_some();
-        let needs: [(&str, bool, &str); 25] = [
+        let needs: [(&str, bool, &str); 27] = [
             ("ao_rays", effects.ao, "--effects ao"),
             ("ao_length", effects.ao, "--effects ao"),
             ("diffuse_rays", effects.diffuse, "--effects diffuse"),
@@ -349,13 +365,15 @@ impl Settings {
             ("lod_correct", self.lod > 0.0, "--lod above 0"),
             ("lod_blend", self.lod > 0.0, "--lod above 0"),
             ("progressive", self.samples() > BATCH_SAMPLES, "--spp above 64"),
-            ("roma.bom", maps || fields, "--secondary roma, auto or df"),
+            ("error", chosen.has(Method::Auto), "--secondary auto"),
+            ("rates", chosen.has(Method::Auto), "--secondary auto"),
+            ("roma.bom", maps || fields, "--secondary roma, sift or df"),
             ("roma.k", by_maps(chosen.ao), "--secondary ao=roma or ao=sift"),
             ("roma.shadow_k", by_maps(chosen.shadow), "--secondary shadow=roma or shadow=sift"),
             ("roma.diffuse_k", by_maps(chosen.diffuse), "--secondary diffuse=roma"),
             ("roma.one_in", chosen.ao == Method::Sift, "--secondary ao=sift"),
             ("roma.error", chosen.has(Method::Sift), "--secondary sift"),
-            ("roma.", maps, "--secondary roma or auto"),
+            ("roma.", maps, "--secondary roma or sift"),
             ("rsm.", chosen.diffuse == Method::Roma, "--secondary diffuse=roma"),
             ("df.", fields, "--secondary df"),
             ("dvf.renew", chosen.has(Method::Dvf) && self.motion.is_some(), "--secondary dvf and --motion"),
@@ -375,17 +393,18 @@ impl Settings {
 
     /// Says that no effect that is on has a method of those chosen.
     fn idle_methods(&self) -> Option<String> {
-        let EffectMethods { ao, diffuse, shadow, .. } = self.secondary;
+        let chosen = self.methods();
+        let EffectMethods { ao, diffuse, shadow, .. } = chosen;
         let effects = self.effects;
         let is_on = [(ao, effects.ao && !effects.environment), (diffuse, effects.diffuse), (shadow, effects.shadow)];
-        let is_idle = self.secondary.has_maps() && is_on.iter().all(|(method, on)| !on || *method == Method::Exact);
-        let list = self.secondary.list().into_iter().filter(|(_, method)| *method != Method::Exact);
+        let is_idle = chosen.has_maps() && is_on.iter().all(|(method, on)| !on || *method == Method::Exact);
+        let list = chosen.list().into_iter().filter(|(_, method)| *method != Method::Exact);
         let of: Vec<&str> = list.map(|(effect, _)| effect).collect();
         let hint = match effects.shadow {
             true => format!("; shadows are traced unless --secondary shadow={} asks", Method::Roma),
             false => String::new(),
         };
-        let (chosen, of) = (self.secondary, of.join(" or "));
+        let of = of.join(" or ");
         is_idle.then(|| format!("--secondary {chosen} has no effect without --effects {of}{hint}"))
     }
 

@@ -1,5 +1,6 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
+use super::auto::Auto;
 use super::open::Session;
 use crate::counters::Record;
 use crate::frame::Renderer;
@@ -14,7 +15,7 @@ const FORMAT: u32 = 2;
 /// video.
 pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, video: Value) -> Value {
     let host_cache = host_cache(&session.renderer);
-    let Session { file, settings: s, renderer, lighting, resolve, field, stops, .. } = session;
+    let Session { file, settings: s, renderer, lighting, resolve, field, stops, auto, .. } = session;
     let resident = renderer.scene.resident();
     let manifest = &resident.manifest;
     let sizes = &renderer.cache.sizes;
@@ -109,6 +110,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "switches": renderer.auto.switches,
             "passes_last_by": renderer.auto.in_force().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
         })),
+        "secondary_auto": auto.as_ref().map(Auto::report),
         "left_out": left_out,
         "texture_bytes_resident": renderer.executor.texture_bytes(),
         "host_cache": host_cache,

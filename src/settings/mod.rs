@@ -10,6 +10,7 @@
 
 mod declare;
 pub mod file;
+pub mod folder;
 mod group;
 pub mod names;
 #[cfg(test)]
@@ -20,7 +21,7 @@ mod types;
 pub mod value;
 
 pub use group::{Entry, Field, Group, Heading, Level, SettingsError};
-pub use sizes::{CacheSize, FrameBudget, HostCacheSize, ImageSize};
+pub use sizes::{CacheSize, ErrorLimit, FrameBudget, HostCacheSize, ImageSize};
 pub use types::{
     Adapter, Direction, Effect, EffectList, Environment, Length, Plane, Policy, Rectangle, Schedule, Turn,
 };

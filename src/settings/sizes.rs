@@ -272,6 +272,57 @@ impl fmt::Display for FrameBudget {
     }
 }
 
+/// The error that `--secondary auto` allows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ErrorLimit {
+    /// Mean FLIP of the picture against the exact one of the same rays, above 0.
+    Flip(f64),
+    /// 100 times the root of relMSE of an effect against the exact one, above 0.
+    Percent(f64),
+}
+
+impl ErrorLimit {
+    /// Its number.
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Flip(value) | Self::Percent(value) => value,
+        }
+    }
+
+    /// Of an error in percent and one in FLIP that which it bounds.
+    pub fn of(self, percent: f64, flip: f64) -> f64 {
+        match self {
+            Self::Flip(_) => flip,
+            Self::Percent(_) => percent,
+        }
+    }
+}
+
+impl FromStr for ErrorLimit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || "an error is a mean FLIP from 0.0001 to 1, as in 0.05, or a percentage to 100, as in 5%".to_owned();
+        let (number, limit): (&str, fn(f64) -> Self) = match text.strip_suffix('%') {
+            Some(number) => (number, Self::Percent),
+            None => (text, Self::Flip),
+        };
+        let limit = limit(number.trim().parse::<f64>().map_err(|_| wrong())?);
+        let most = if matches!(limit, Self::Flip(_)) { 1.0 } else { 100.0 };
+        if (1e-4..=most).contains(&limit.value()) { Ok(limit) } else { Err(wrong()) }
+    }
+}
+
+impl fmt::Display for ErrorLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Flip(value) => write!(f, "{value}"),
+            Self::Percent(value) => write!(f, "{value}%"),
+        }
+    }
+}
+
 /// Width and height of an image, each 1..=[`MAX_IMAGE_PX`] pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ImageSize {

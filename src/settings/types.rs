@@ -1,7 +1,7 @@
 //! Types of settings that are no plain numbers.
 
 use super::names::names;
-use super::sizes::{CacheSize, FrameBudget, HostCacheSize, ImageSize};
+use super::sizes::{CacheSize, ErrorLimit, FrameBudget, HostCacheSize, ImageSize};
 use super::value::{Plain, Rule, Value, value_of_text};
 use glam::DVec3;
 use std::convert::Infallible;
@@ -358,7 +358,7 @@ impl fmt::Display for Adapter {
     }
 }
 
-value_of_text!(CacheSize, FrameBudget, HostCacheSize, ImageSize, Environment, Adapter; false);
+value_of_text!(CacheSize, ErrorLimit, FrameBudget, HostCacheSize, ImageSize, Environment, Adapter; false);
 
 #[cfg(test)]
 mod tests {

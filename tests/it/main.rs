@@ -79,6 +79,7 @@ mod shading {
 
 /// Methods of secondary visibility against closed forms and exact rays.
 mod secondary {
+    mod auto;
     mod displacement;
     mod dvf;
     mod dvf_paper;

@@ -74,6 +74,8 @@ pub enum Command {
     /// Measure error against run time in a scene: which setting to use, and what does not pay
     #[cfg(feature = "lab")]
     Study(StudyCommand),
+    /// Measure what rays take on this device, for --secondary auto
+    Calibrate(CalibrateArgs),
     /// List the devices that can render
     Adapters(AdaptersArgs),
     /// Test this machine's device: exactness and numerical stability
@@ -110,6 +112,29 @@ pub struct AdaptersArgs {
     /// Print JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// Options of `calibrate`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = UNITS)]
+pub struct CalibrateArgs {
+    /// Scenes that get rates of their own; without any, rates of generated scenes are measured, for all others
+    #[arg(value_name = "S.bricks")]
+    pub scenes: Vec<PathBuf>,
+    /// File of rates to write to. What it has of other devices and scenes stays. [default: rates.json in the user's
+    /// folder for settings, or in BRICKWALK_CONFIG_DIR]
+    #[arg(long, value_name = "FILE")]
+    pub rates: Option<PathBuf>,
+    /// Camera path to measure along; three views of it are rendered. [default: one made from the scene's bounds]
+    #[arg(long, value_name = "FILE", requires = "scenes")]
+    pub path: Option<PathBuf>,
+    /// Width and height of the pictures in pixels, each 1 to 16384; rates are best for pictures of about this size
+    #[arg(long, value_name = "WxH", default_value = "640x360")]
+    pub size: ImageSize,
+    /// What renders: auto (a hardware GPU if there is one, else the processor), cpu (the processor), or the graphics
+    /// adapter whose name contains NAME, upper and lower case alike; `brickwalk adapters` lists them
+    #[arg(long, value_name = "NAME", env = "BRICKWALK_ADAPTER", default_value = "auto")]
+    pub adapter: Adapter,
 }
 
 /// Options of `demo`.

@@ -1,6 +1,7 @@
 //! What is measured: every way to answer the rays of an effect, over sizes of the cache.
 
 use super::args::{Effect, Scale};
+use crate::session::auto::candidates::alone;
 
 /// What a scene has that some ways need.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,12 +41,7 @@ pub const USUAL: u32 = 4;
 
 /// Options of `walk` for an effect by itself, without rays.
 pub fn base(effect: Effect) -> &'static str {
-    match effect {
-        Effect::Ao => "--effects ao --sun-intensity 0",
-        Effect::Shadow => "--effects shadow --sky-intensity 0",
-        Effect::Diffuse => "--effects shadow,diffuse --sky-intensity 0",
-        Effect::Environment => "--effects environment --environment sky",
-    }
+    alone(effect.name())
 }
 
 /// Options of `walk` for so many rays of an effect a pixel.

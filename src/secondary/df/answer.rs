@@ -42,6 +42,10 @@ impl Df {
 }
 
 impl Secondary for Df {
+    fn name(&self) -> &'static str {
+        "df"
+    }
+
     fn begin(&mut self, camera: &Camera, view: &View) {
         self.base.begin(camera.position, view);
     }

@@ -100,6 +100,10 @@ impl Displacement {
 }
 
 impl Secondary for Displacement {
+    fn name(&self) -> &'static str {
+        "displacement"
+    }
+
     fn begin(&mut self, _: &Camera, view: &View) {
         self.frame = Some(view.frame);
     }

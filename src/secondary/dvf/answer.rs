@@ -56,6 +56,10 @@ impl Dvf {
 }
 
 impl Secondary for Dvf {
+    fn name(&self) -> &'static str {
+        "dvf"
+    }
+
     fn begin(&mut self, _camera: &Camera, view: &View) {
         (self.frame, self.sample) = (Some(view.frame), view.params.sample);
     }

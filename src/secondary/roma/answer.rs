@@ -109,6 +109,11 @@ impl Roma {
 }
 
 impl Secondary for Roma {
+    fn name(&self) -> &'static str {
+        let passes = self.settings.map(|own| [own.occlusion, own.shadow, own.diffuse]).unwrap_or_default();
+        if passes.iter().flatten().any(|pass| pass.role.is_help()) { "sift" } else { "roma" }
+    }
+
     fn begin(&mut self, camera: &Camera, view: &View) {
         self.base.begin(camera.position, view);
         self.made = None;

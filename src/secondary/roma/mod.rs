@@ -132,6 +132,18 @@ pub struct RomaSettings {
     pub rsm: RsmSettings,
 }
 
+impl RomaSettings {
+    /// These, and those of `other` for rays that they do nothing for.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            occlusion: self.occlusion.or(other.occlusion),
+            shadow: self.shadow.or(other.shadow),
+            diffuse: self.diffuse.or(other.diffuse),
+            rsm: self.rsm,
+        }
+    }
+}
+
 /// Most cells of a map on each axis.
 pub const MOST_CELLS: u32 = 256;
 

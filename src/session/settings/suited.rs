@@ -8,7 +8,7 @@ use glam::DVec3;
 impl Settings {
     /// These settings with what suits the scene of `manifest` in the place of `auto`.
     pub fn suited(&self, manifest: &Manifest) -> Self {
-        let mut suited = self.clone();
+        let mut suited = Self { secondary: self.methods(), ..self.clone() };
         if self.ao_length == Length::Auto {
             suited.ao_length = Length::World(occlusion_length(manifest));
         }

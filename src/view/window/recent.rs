@@ -3,13 +3,12 @@
 
 use crate::output::atomic;
 use crate::scene::Camera;
+use crate::settings::folder;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Most scenes that are remembered.
 const MOST: usize = 12;
-/// Names the folder; without it it is the folder `brickwalk` of the platform's.
-const FOLDER_VARIABLE: &str = "BRICKWALK_CONFIG_DIR";
 
 /// A view that was kept.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,21 +44,10 @@ pub struct Recent {
     file: Option<PathBuf>,
 }
 
-/// The folder for settings of the platform.
-fn folder() -> Option<PathBuf> {
-    let of = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let of_platform = || match () {
-        () if cfg!(windows) => of("APPDATA"),
-        () if cfg!(target_os = "macos") => of("HOME").map(|home| home.join("Library/Application Support")),
-        () => of("XDG_CONFIG_HOME").or_else(|| of("HOME").map(|home| home.join(".config"))),
-    };
-    of(FOLDER_VARIABLE).or_else(|| of_platform().map(|folder| folder.join("brickwalk")))
-}
-
 impl Recent {
     /// What was remembered; nothing where that cannot be read.
     pub fn load() -> Self {
-        folder().map_or_else(Self::default, |folder| Self::load_from(&folder.join("window.json")))
+        folder::settings().map_or_else(Self::default, |folder| Self::load_from(&folder.join("window.json")))
     }
 
     fn load_from(file: &Path) -> Self {

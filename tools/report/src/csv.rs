@@ -9,9 +9,9 @@ pub fn quoted(text: &str) -> String {
     if special { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_string() }
 }
 
-/// All records: `frame`, `pass`, `schedule`, then the numeric fields; empty where a record lacks one.
+/// All records: `frame`, `pass`, `schedule`, `methods`, then the numeric fields; empty where a record lacks one.
 pub fn records(walk: &Walk) -> String {
-    let mut text = String::from("frame,pass,schedule");
+    let mut text = String::from("frame,pass,schedule,methods");
     for field in &walk.fields {
         text.push(',');
         text.push_str(&quoted(field));
@@ -23,7 +23,8 @@ pub fn records(walk: &Walk) -> String {
             let start = pass.rows.partition_point(|row| row.frame < *frame);
             for row in pass.rows[start..].iter().take_while(|row| row.frame == *frame) {
                 // Writing to a string does not fail.
-                let _ = write!(text, "{frame},{},{}", quoted(&pass.name), quoted(&row.schedule));
+                let _ =
+                    write!(text, "{frame},{},{},{}", quoted(&pass.name), quoted(&row.schedule), quoted(&row.methods));
                 for field in &walk.fields {
                     let _ = match row.get(field) {
                         Some(value) => write!(text, ",{value}"),

@@ -62,7 +62,8 @@ pub fn schedules(walk: &Walk) -> Option<Markup> {
             h3 { "Schedules" }
             p.reading {
                 "With auto, a pass now and then tries a schedule that was slower before; such frames stand out in "
-                "plots. A pass with several schedules has directions, lamps or samples that were traced by either."
+                "plots. A pass with several schedules has directions, lamps or samples that were traced by either. "
+                "Methods that answered rays stand behind the schedule."
             }
             div.wide { table {
                 thead { tr {
@@ -198,7 +199,7 @@ pub fn per_frame(walk: &Walk) -> Markup {
                         @let start = pass.rows.partition_point(|row| row.frame < *frame);
                         @for row in pass.rows[start..].iter().take_while(|row| row.frame == *frame) {
                             tr {
-                                th scope="row" { (frame) } td.text { (pass.name) } td.text { (row.schedule) }
+                                th scope="row" { (frame) } td.text { (pass.name) } td.text { (row.by()) }
                                 @for field in RAYS { td { (cell(row.get(field), value)) } }
                                 @for field in ["mrays_per_s", "ms"] { td { (cell(row.get(field), format::number)) } }
                                 td { (cell(row.get("queries"), value)) } td { (format::mebibytes(row.sum(&MOVED))) }

@@ -15,6 +15,8 @@ pub struct Row {
     pub frame: u64,
     /// The schedules that its rays were traced by; empty where it had none, or where they are not recorded.
     pub schedule: String,
+    /// The methods that answered its rays; empty where none did, or where they are not recorded.
+    pub methods: String,
     /// The numeric fields by name, `frame` left out. Integers are exact up to 2⁵³.
     values: HashMap<String, f64>,
 }
@@ -23,6 +25,15 @@ impl Row {
     /// A field's value; `None` where the record lacks it.
     pub fn get(&self, field: &str) -> Option<f64> {
         self.values.get(field).copied()
+    }
+
+    /// Who traced and answered its rays.
+    pub fn by(&self) -> String {
+        match (&self.schedule[..], &self.methods[..]) {
+            ("", "") => "none".into(),
+            (one, "") | ("", one) => one.into(),
+            (schedule, methods) => format!("{schedule}, {methods}"),
+        }
     }
 
     /// The sum of those of `fields` that the record has; 0 of none.
@@ -46,19 +57,19 @@ impl Pass {
         self.rows.iter().filter_map(|row| Some((row.frame as f64, row.get(field)?))).collect()
     }
 
-    /// Frames that have another schedule than the one before, with what they have.
+    /// Frames whose rays another schedule traced, or other methods answered, than the frame's before, with what did.
     pub fn switches(&self) -> Vec<(f64, String)> {
-        let changes = self.rows.windows(2).filter(|pair| pair[0].schedule != pair[1].schedule);
-        changes.map(|pair| (pair[1].frame as f64, named(&pair[1].schedule).to_owned())).collect()
+        let changes = self.rows.windows(2).filter(|pair| pair[0].by() != pair[1].by());
+        changes.map(|pair| (pair[1].frame as f64, pair[1].by())).collect()
     }
 
-    /// The frames by schedule, in the order in which these were used first.
-    pub fn by_schedule(&self) -> Vec<(&str, Vec<&Row>)> {
-        let mut groups: Vec<(&str, Vec<&Row>)> = Vec::new();
+    /// The frames by schedule and methods, in the order in which these were used first.
+    pub fn by_schedule(&self) -> Vec<(String, Vec<&Row>)> {
+        let mut groups: Vec<(String, Vec<&Row>)> = Vec::new();
         for row in &self.rows {
-            match groups.iter_mut().find(|(name, _)| *name == named(&row.schedule)) {
+            match groups.iter_mut().find(|(name, _)| *name == row.by()) {
                 Some((_, rows)) => rows.push(row),
-                None => groups.push((named(&row.schedule), vec![row])),
+                None => groups.push((row.by(), vec![row])),
             }
         }
         groups
@@ -79,11 +90,6 @@ impl Pass {
     pub fn has_nonzero(&self, field: &str) -> bool {
         self.rows.iter().any(|row| row.get(field).is_some_and(|v| v != 0.0))
     }
-}
-
-/// The name of a schedule.
-fn named(schedule: &str) -> &str {
-    if schedule.is_empty() { "none" } else { schedule }
 }
 
 /// Statistics of one field.
@@ -168,13 +174,14 @@ impl Walk {
             Some(value) => value.as_u64().ok_or("\"frame\" must be an integer from 0")?,
             None => return Err("the record has no \"frame\"".into()),
         };
-        let (mut values, mut schedule) = (HashMap::new(), String::new());
+        let (mut values, mut schedule, mut methods) = (HashMap::new(), String::new(), String::new());
         for (key, value) in object {
             if key == "frame" || key == "pass" {
                 continue;
             }
             match value {
                 Value::String(text) if key == "schedule" => schedule = text,
+                Value::String(text) if key == "methods" => methods = text,
                 // An optional field may be spelled out as absent.
                 Value::Null => {}
                 Value::Number(number) => {
@@ -188,7 +195,7 @@ impl Walk {
                 _ => return Err(format!("\"{key}\" must be a number")),
             }
         }
-        Ok((pass, Row { frame, schedule, values }))
+        Ok((pass, Row { frame, schedule, methods, values }))
     }
 
     fn add(&mut self, pass: &str, row: Row) {
