@@ -26,7 +26,7 @@ pub mod viewpoint;
 pub use crate::output::npy::{Hit, Ray};
 pub use extent::extent;
 pub use nodes::{Named, SceneNode, find, nodes};
-pub use open::{Frame, Session, Watch, developed, levelled};
+pub use open::{Frame, LeftOut, Session, Watch, developed, levelled};
 pub use opened::{Opened, open_scene};
 pub use origin::{Origin, provenance};
 pub use pictures::{Pictures, Preview};

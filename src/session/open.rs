@@ -2,7 +2,7 @@
 
 use super::auto::{Auto, Wanted};
 use super::checkpoints::{Checkpoint, ErrorMeter, References};
-use super::left_out::{self, LeftOut};
+use super::left_out;
 use super::lighting::{Lighting, lighting};
 use super::motion::SceneMotion;
 use super::opened::{Opened, open_scene};
@@ -27,7 +27,7 @@ use crate::secondary::{EffectMethods, Method};
 use crate::session::Settings;
 use anyhow::{Context, Result, anyhow, bail};
 use bricks::SceneFile;
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -116,6 +116,17 @@ pub fn developed(radiance: &[[f32; 3]], stops: f64, tone_map: ToneMap) -> Vec<[u
     let gain = stops.exp2() as f32;
     let shown: Vec<[f32; 3]> = radiance.iter().map(|c| tone_map.apply(c.map(|x| x * gain))).collect();
     srgb::pixels(&shown)
+}
+
+/// What of all that rendering may need there was, as summaries list it.
+#[derive(Clone, Debug, Default)]
+pub struct LeftOut {
+    /// What was there.
+    pub kept: Vec<Value>,
+    /// What was not.
+    pub left_out: Vec<Value>,
+    /// What leaving all of it out saves, where that was measured; else null.
+    pub together: Value,
 }
 
 /// A scene on a device, with settings: it renders frames and traces rays.
@@ -338,18 +349,20 @@ impl Session {
         Ok(hits)
     }
 
-    /// What was left out because the scene does not need it, as summaries list it; measured where settings ask for it.
+    /// What of all that rendering may need was there and what was left out, and why, as summaries list it; what that
+    /// saves is measured where settings ask for it.
     ///
     /// # Errors
     /// The device's.
-    pub fn left_out(&mut self) -> Result<Vec<Value>> {
-        let all: Vec<LeftOut> = left_out::left_out(&mut self.renderer);
+    pub fn left_out(&mut self) -> Result<LeftOut> {
+        let all = left_out::components(&mut self.renderer, &self.settings);
         let camera = self.path.frame(0, self.settings.frames);
-        let measured: Vec<Map<String, Value>> = match &self.first {
+        let measured = match &self.first {
             Some((scene, light)) => left_out::measure(&all, scene, &self.file, &self.settings, light, &camera)?,
-            None => Vec::new(),
+            None => left_out::Measured::default(),
         };
-        Ok(left_out::listed(&all, &measured))
+        let left_out = left_out::listed(&all, false, &measured.each);
+        Ok(LeftOut { kept: left_out::listed(&all, true, &[]), left_out, together: measured.together })
     }
 
     /// Writes the trace of requests, if settings ask for one.

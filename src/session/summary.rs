@@ -1,7 +1,7 @@
 //! `summary.json`: what was asked for, on what it ran, and what came of it.
 
 use super::auto::Auto;
-use super::open::Session;
+use super::open::{LeftOut, Session};
 use crate::counters::Record;
 use crate::frame::Renderer;
 use crate::session::Settings;
@@ -11,9 +11,9 @@ use serde_json::{Map, Value, json};
 /// Raised when a field changes its meaning.
 const FORMAT: u32 = 2;
 
-/// The summary of a session with the frames of `records`; `left_out` is what was left out, `video` what became of a
-/// video.
-pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, video: Value) -> Value {
+/// The summary of a session with the frames of `records`; `left_out` is what was there and what was not, `video` what
+/// became of a video.
+pub fn summary(session: &mut Session, records: &[Record], left_out: LeftOut, video: Value) -> Value {
     let host_cache = host_cache(&session.renderer);
     let Session { file, settings: s, renderer, lighting, resolve, field, stops, auto, .. } = session;
     let resident = renderer.scene.resident();
@@ -111,7 +111,9 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: Vec<Value>, 
             "passes_last_by": renderer.auto.in_force().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
         })),
         "secondary_auto": auto.as_ref().map(Auto::report),
-        "left_out": left_out,
+        "kept": left_out.kept,
+        "left_out": left_out.left_out,
+        "left_out_together": left_out.together,
         "texture_bytes_resident": renderer.executor.texture_bytes(),
         "host_cache": host_cache,
         "error": s.measure_error.then(|| errors(records)),

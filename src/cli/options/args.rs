@@ -118,7 +118,8 @@ pub struct AdaptersArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct CalibrateArgs {
-    /// Scenes that get rates of their own; without any, rates of generated scenes are measured, for all others
+    /// Scenes that get rates of their own. Without any, rates of generated scenes are measured, for all others.
+    /// [default: none]
     #[arg(value_name = "S.bricks")]
     pub scenes: Vec<PathBuf>,
     /// File of rates to write to. What it has of other devices and scenes stays. [default: rates.json in the user's

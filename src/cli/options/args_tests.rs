@@ -283,6 +283,7 @@ fn help_explains_units_and_defaults() {
         "adapters",
         "bake-displacement",
         "bench",
+        "calibrate",
         "compare",
         "completions",
         "convert",

@@ -43,10 +43,16 @@ pub struct Row {
     pub seconds_p95: f64,
     /// Before the first picture.
     pub seconds_making: f64,
+    /// Camera rays of a picture.
+    #[serde(default)]
+    pub rays_camera: u64,
     /// Rays of a picture that were traced.
     pub rays_traced: u64,
     /// Rays of a picture that a method answered.
     pub rays_answered: u64,
+    /// Query pairs of a picture.
+    #[serde(default)]
+    pub queries: u64,
     /// Bytes that a picture loaded; of those that begin with a cache as it was left, the mean.
     pub bytes_loaded: f64,
     /// Mean FLIP against the exact picture of the same rays.
@@ -179,8 +185,10 @@ impl Measured<'_> {
             seconds_frame: median(turns.seconds.clone()).unwrap_or(0.0),
             seconds_p95: quantile(turns.seconds.clone(), 0.95),
             seconds_making: party.making,
+            rays_camera: sum(|record| if record.pass == "primary" { record.rays() } else { 0 }),
             rays_traced: sum(|record| record.rays_traced),
             rays_answered: sum(|record| record.rays_answered),
+            queries: sum(|record| record.queries()),
             bytes_loaded: turns.loaded.iter().sum::<u64>() as f64 / turns.loaded.len().max(1) as f64,
             flip_same: flip(image, same)?,
             relmse_same: of_same.rel_mse,

@@ -58,7 +58,7 @@ settings! {
         /// With --secondary sift: how many of a hundred rays of `ao` or `shadow` maps may answer wrongly; or off. Rays
         /// that maps do not find free are traced as far as that takes, which one ray in 16 measures. `off`: they are
         /// traced to their ends, and nothing is measured.
-        error: Option<f64> = Some(2.0), "--auto-error PERCENT|off", Rule::Real(0.1, 50.0), "percent", Methods, Usual;
+        error: Option<f64> = Some(2.0), "--auto-error PERCENT|off", Rule::Real(0.1, 50.0), "percent", Methods, Expert;
     }
 }
 

@@ -1,10 +1,10 @@
-//! `--secondary auto`: of each effect the rays are answered by the method that is expected to take least, if it pays and
-//! errs by no more than `--error`.
+//! `--secondary auto`: of each effect the rays are answered by the method that is expected to take least, if it pays
+//! and errs by no more than `--error`.
 //!
 //! Frames go in blocks of [`BLOCK`]. The first of a block is exact. Its counts and the rates of the device say which
 //! methods pay. The frame is rendered by these as well, and what errs little enough answers the rest of the block. All
-//! of it follows from settings, scene, camera path, size of the cache and rates: no clock decides, and a block depends on
-//! no other, so that parts of a walk show what the whole walk does.
+//! of it follows from settings, scene, camera path, size of the cache and rates: no clock decides, and a block depends
+//! on no other, so that parts of a walk show what the whole walk does.
 
 pub mod calibrate;
 pub mod candidates;

@@ -8,7 +8,7 @@ use crate::settings::ErrorLimit;
 /// A method is taken where it is expected to take less than this share of what exact rays do.
 const PAYS: f64 = 0.9;
 /// Errors of a frame must be below this share of what is allowed, as those of the frames after it may be larger.
-pub const MARGIN: f64 = 0.8;
+pub const MARGIN: f64 = 0.75;
 
 /// What a frame has of the rays of an effect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

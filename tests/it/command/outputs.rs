@@ -280,23 +280,44 @@ fn a_frame_of_many_samples_is_shown_while_it_is_made() {
 fn what_leaving_out_saves_is_measured_where_it_is_asked_for() {
     let folder = common::folder();
     let scene = common::city(folder.path(), "10K", "1K");
-    let listed = |options: &str| -> Vec<serde_json::Value> {
+    let summed = |options: &str| -> serde_json::Value {
         let output = folder.path().join("out");
         common::walk(&scene, &output, &format!("--frames 1 --size 48x32 --cache 100% --adapter cpu {options}"));
         let text = std::fs::read_to_string(output.join("summary.json")).expect("a summary");
-        let summary: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        summary["left_out"].as_array().expect("a list").clone()
+        serde_json::from_str(&text).expect("JSON")
     };
-    let measured = listed("--measure-left-out");
+    let listed = |summary: &serde_json::Value, list: &str| summary[list].as_array().expect("a list").clone();
+    let summary = summed("--measure-left-out --effects shadow,ao,diffuse");
+    let measured = listed(&summary, "left_out");
     let entry = |what: &str| measured.iter().find(|one| one["what"] == what).expect("an entry").clone();
     for what in ["queries for missing bricks", "texture lookups"] {
         let one = entry(what);
         let ms = |field: &str| one[field].as_f64().expect("a time");
         assert!(ms("ms_frame") > 0.0 && ms("ms_frame_kept") > 0.0 && one["repetitions"] == 5, "{one}");
         assert!((ms("ms_frame_kept") - ms("ms_frame") - ms("ms_saved")).abs() < 1e-9, "{one}");
+        assert_eq!(one["same_picture"], true, "{one}");
     }
     for what in ["instance transforms", "alpha tests in traversal"] {
         assert!(entry(what).get("ms_saved").is_none(), "the processor's kernels decide on {what} as they run");
     }
-    assert!(listed("").iter().all(|one| one.get("ms_frame").is_none() && one["why"].is_string()));
+    let together = &summary["left_out_together"];
+    assert!(together["ms_frame_kept"].as_f64().is_some_and(|ms| ms > 0.0) && together["same_picture"] == true);
+    let bare = summed("--effects shadow");
+    let out = listed(&bare, "left_out");
+    assert!(out.iter().all(|one| one.get("ms_frame").is_none() && one["why"].is_string() && one["how"].is_string()));
+    assert!(bare["left_out_together"].is_null());
+    // Every component is in one of the lists, and what is asked for is there.
+    let names = |summary: &serde_json::Value, list: &str| -> Vec<String> {
+        listed(summary, list).iter().map(|one| one["what"].as_str().expect("a name").to_owned()).collect()
+    };
+    let all = |summary: &serde_json::Value| {
+        let mut all = [names(summary, "kept"), names(summary, "left_out")].concat();
+        all.sort();
+        all
+    };
+    assert_eq!(all(&summary), all(&bare));
+    let bounces = "rays from hits of rays".to_owned();
+    assert!(names(&summary, "kept").contains(&bounces) && names(&bare, "left_out").contains(&bounces));
+    let size = out.iter().find(|one| one["what"] == bounces).and_then(|one| one["bytes"].as_u64());
+    assert!(size.is_some_and(|bytes| bytes > 48 * 32 * 64), "{size:?}");
 }

@@ -10,7 +10,7 @@ use brickwalk::session::open_scene;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
-const COMMON: &str = "--adapter cpu --size 64x36 --effects ao --ao-rays 4 --ao-length 60 --frames 40";
+const COMMON: &str = "--adapter cpu --size 64x36 --effects ao --ao-rays 4 --ao-length 60 --frames 64";
 const MAPS: &str = "--secondary ao=roma --roma-size 64 --roma-k 4";
 const NAME: &str = "roma, 64 cells";
 
@@ -75,7 +75,7 @@ fn a_method_that_pays_and_errs_little_answers_all_frames_but_the_first() {
 fn a_part_of_a_walk_shows_what_the_whole_walk_does() {
     let folder = folder();
     let scene = city(folder.path(), "40K", "1K");
-    let options = "--error 1 --frames 64";
+    let options = "--error 1";
     let mut whole = auto(&scene, rates(0.3, 1.0), options);
     let last = BLOCK + 2;
     let all: Vec<_> = (0..=last).map(|number| frame(&mut whole, number)).collect();
@@ -83,7 +83,7 @@ fn a_part_of_a_walk_shows_what_the_whole_walk_does() {
     for number in [last, BLOCK, BLOCK + 1] {
         assert!(frame(&mut part, number) == all[number as usize], "frame {number}");
     }
-    let mut maps = open(&scene, &format!("{MAPS} --frames 64"));
+    let mut maps = open(&scene, MAPS);
     assert!(frame(&mut maps, last) == all[last as usize], "the method is in force");
 }
 
@@ -99,7 +99,8 @@ fn errors_are_those_of_the_pictures() {
     let (exact, maps) = (image(""), image(MAPS));
     let flip = flip_ldr(&maps, &exact, PIXELS_PER_DEGREE).expect("images of a size").mean();
     let output = folder.path().join("out");
-    walk(&scene, &output, &format!("{COMMON} --frames 32 --secondary auto --error 0.5 --rates {}", file.display()));
+    let common = COMMON.replace("--frames 64", "--frames 32");
+    walk(&scene, &output, &format!("{common} --secondary auto --error 0.5 --rates {}", file.display()));
     let summary = json(&output.join("summary.json"));
     let ao = &summary["secondary_auto"]["effects"]["ao"];
     let trial = &ao["trials"][0];
