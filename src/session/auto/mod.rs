@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
 /// Frames for which methods are chosen together.
 pub const BLOCK: u32 = 32;
 /// Share of what the frames of a block take exactly that measuring errors may take.
-const SHARE: f64 = 0.03;
+const SHARE: f64 = 0.04;
 
 /// A frame of a walk.
 pub struct Wanted<'a> {
