@@ -42,7 +42,8 @@ def errors(args, own, exact):
     found = []
     for frame in sorted(pathlib.Path(own, "frames").glob("*.exr")):
         other = pathlib.Path(exact, "frames", frame.name)
-        done = subprocess.run([args.program, "compare", frame, other, "--json"], capture_output=True, text=True, check=True)
+        words = [args.program, "compare", frame, other, "--json"]
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
         found.append(100.0 * json.loads(done.stdout)["rel_mse"] ** 0.5)
     return found
 
@@ -79,8 +80,8 @@ def main():
     parser.add_argument("scenes", nargs="+", help="scene files")
     parser.add_argument("--rates", help="file of rates; default: the user's")
     parser.add_argument("--effects", default="ao,shadow,diffuse,environment", help="effects, with commas between them")
-    parser.add_argument("--errors", default="5%%".replace("%%", "%"), help="values of --error, with commas between them")
-    parser.add_argument("--caches", default="100%%".replace("%%", "%"), help="values of --cache, with commas between them")
+    parser.add_argument("--errors", default="5%", help="values of --error, with commas between them")
+    parser.add_argument("--caches", default="100%", help="values of --cache, with commas between them")
     parser.add_argument("--pairs", type=int, default=9, help="pairs of walks a row")
     parser.add_argument("--frames", type=int, default=32, help="frames a walk")
     parser.add_argument("--size", default="640x360", help="pixels")
