@@ -13,6 +13,8 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// Methods in the order of their colours.
+const METHODS: [&str; 9] = ["exact", "roma", "levels", "sift", "df", "denoised", "dvf", "displacement", "threshold"];
 /// Errors within which the fastest setting is named.
 const WITHIN: [f64; 3] = [0.02, 0.05, 0.1];
 /// Frames over which what is made before them is shared.
@@ -235,7 +237,7 @@ fn plot(group: &Group) -> Graph {
         ],
         is_best: is_on_front(row, rows),
     };
-    let scatter = Scatter { axes: ["ms a frame", "FLIP"], points: rows.iter().map(point).collect() };
+    let scatter = Scatter { axes: ["ms a frame", "FLIP"], kinds: &METHODS, points: rows.iter().map(point).collect() };
     let reading = "Lower and farther left is better. No setting is both faster and nearer than those on the line; \
                    others are faint.";
     let title = format!("FLIP over time: {}", title(group));

@@ -83,8 +83,8 @@ pub fn measure(file: &Path, settings: &Settings, progress: &mut Progress) -> Res
     let (path, name) = (session.path().clone(), file.display().to_string());
     let scene = session.renderer().scene.clone();
     let device = device_key(&session.renderer().executor.device());
-    let mut rates = Rates::default();
-    rates.byte = seconds_a_byte(session.renderer(), &path).with_context(|| name.clone())?;
+    let byte = seconds_a_byte(session.renderer(), &path).with_context(|| name.clone())?;
+    let mut rates = Rates { byte, ..Rates::default() };
     let folder = tempfile::tempdir()?;
     let field = folder.path().join("field.dvf");
     let mut primary = Vec::new();

@@ -48,6 +48,7 @@ pub const CANDIDATES: &[Candidate] = &[
     maps("shadow", "roma, 128 cells", &[("roma.size", "128"), ("roma.shadow_k", "4")]),
     displacement("shadow"),
     maps("diffuse", "roma, 32 cells", &[("roma.size", "32"), ("roma.diffuse_k", "4")]),
+    maps("diffuse", "roma, 64 cells", &[("roma.size", "64"), ("roma.diffuse_k", "4")]),
     maps("diffuse", "roma, 128 cells", &[("roma.size", "128"), ("roma.diffuse_k", "4")]),
     displacement("diffuse"),
     Candidate {

@@ -31,6 +31,9 @@ pub struct Point {
 pub struct Scatter {
     /// What runs along the axes.
     pub axes: [&'static str; 2],
+    /// Kinds in the order of their looks, whether there are points of them or not: a page's plots look alike. Others
+    /// follow.
+    pub kinds: &'static [&'static str],
     /// The points.
     pub points: Vec<Point>,
 }
@@ -94,16 +97,19 @@ impl Scale {
 }
 
 impl Scatter {
-    /// Kinds in their order, each with its colour; those of the second round of colours are squares.
+    /// Kinds that there are points of, in their order, each with its colour; those of the second round of colours are
+    /// squares.
     fn kinds(&self) -> Vec<(&str, Mark)> {
-        let mut kinds: Vec<&str> = Vec::new();
+        let mut kinds: Vec<&str> = self.kinds.to_vec();
         for point in &self.points {
             if !kinds.contains(&&*point.kind) {
                 kinds.push(&point.kind);
             }
         }
         let mark = |k: usize| Mark { ink: INKS[k % INKS.len()], is_square: k / INKS.len() % 2 == 1 };
-        kinds.into_iter().enumerate().map(|(k, kind)| (kind, mark(k))).collect()
+        let has = |kind: &str| self.points.iter().any(|point| point.kind == kind);
+        let marked = kinds.into_iter().enumerate().map(|(k, kind)| (kind, mark(k)));
+        marked.filter(|(kind, _)| has(kind)).collect()
     }
 
     /// As a figure; `None` without points.
@@ -186,7 +192,7 @@ mod tests {
             point(100.0, 1.0, "maps", false),
             point(10.0, 0.0, "maps", false),
         ];
-        let scatter = Scatter { axes: ["ms", "FLIP"], points };
+        let scatter = Scatter { axes: ["ms", "FLIP"], kinds: &[], points };
         let text = scatter.figure("a title", "how to read it").expect("a figure").into_string();
         assert_eq!(text.matches("<circle").count(), 5 + 2, "points and the legend");
         assert!(text.contains("maps &lt;100&gt;\na command") && !text.contains("maps <100>"));
@@ -196,6 +202,10 @@ mod tests {
         assert_eq!(places.len(), 6);
         assert!((places[2] - places[0] - (places[4] - places[2])).abs() < 0.3, "{places:?}");
         assert!((places[3] - places[1] - (places[5] - places[3])).abs() < 0.3 && places[5] > places[1], "{places:?}");
+        // Kinds keep their looks where others are missing.
+        let listed = Scatter { kinds: &["fields", "maps", "exact"], ..scatter.clone() };
+        assert_eq!(listed.kinds().iter().map(|(kind, _)| *kind).collect::<Vec<_>>(), ["maps", "exact"]);
+        assert!(listed.kinds()[0].1.ink == INKS[1] && scatter.kinds()[0].1.ink == INKS[0]);
         assert!(Scatter { points: vec![], ..scatter }.figure("", "").is_none());
     }
 }
