@@ -395,15 +395,6 @@ impl Auto {
             "effects": self.effects.iter().map(effect).collect::<Map<String, Value>>(),
         })
     }
-
-    /// What answers the rays of its effects, a line each.
-    pub fn told(&self) -> Vec<String> {
-        let line = |own: &Own| {
-            let by = own.takes.map_or("exact", |candidate| candidate.name);
-            format!("{}: {by}: {}", own.effect, own.why)
-        };
-        self.effects.iter().map(line).collect()
-    }
 }
 
 impl Own {

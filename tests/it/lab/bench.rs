@@ -237,10 +237,10 @@ fn maps_and_bricks_together_are_measured() {
     assert_eq!(json["measured"], 20);
     let own = table(&json, "handover");
     let of = |way: &str, name: &str| number(&entry(own, &["city", "rays of 64, cache 15 %", way], name));
-    assert!(of("auto, in doubt traced", "FLIP") < of("roma 128 K=4", "FLIP"), "what is traced is not in doubt");
-    assert!(of("auto, 2 % wrong", "FLIP") <= of("roma 128 K=4", "FLIP"), "maps answer what they answer well");
+    assert!(of("sift, in doubt traced", "FLIP") < of("roma 128 K=4", "FLIP"), "what is traced is not in doubt");
+    assert!(of("sift, 2 % wrong", "FLIP") <= of("roma 128 K=4", "FLIP"), "maps answer what they answer well");
     assert_eq!(of("exact (noise)", "whole ÷ exact"), 1.0);
-    for way in ["roma 128 K=4", "auto, one in 8"] {
+    for way in ["roma 128 K=4", "sift, one in 8"] {
         let ratio = of(way, "whole, ms") / of("exact (noise)", "whole, ms");
         assert_eq!(of(way, "whole ÷ exact"), ratio, "{way}");
     }

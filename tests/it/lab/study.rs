@@ -56,7 +56,7 @@ fn points_are_those_of_rows(output: &Path) {
 const BOUNDS: [(&str, &str, f64, f64); 8] = [
     ("ao", "roma", 0.0225, 1.7),
     ("ao", "df", 0.0837, 6.7),
-    ("ao", "auto", 0.001, 0.1),
+    ("ao", "sift", 0.001, 0.1),
     ("ao", "threshold", 0.0763, 2.85),
     ("ao", "denoised", 0.0208, 0.36),
     ("environment", "dvf", 0.1281, 6.71),
@@ -129,6 +129,9 @@ fn rows_say_what_commands_render() {
         if row["cold"] == true {
             assert!(number(row, "bytes_loaded") > 0.0, "{row}");
         }
+    }
+    for (effect, method, ..) in BOUNDS {
+        assert!(found.iter().any(|row| row["effect"] == effect && row["method"] == method), "{effect} by {method}");
     }
     let exact = |rays: u64| {
         let is = |row: &&Value| row["method"] == "exact" && row["rays_per_pixel"] == rays && row["effect"] == "ao";
