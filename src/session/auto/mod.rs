@@ -376,7 +376,10 @@ impl Auto {
     /// What summaries say.
     pub fn report(&self) -> Value {
         let effect = |own: &Own| {
-            let trial = |&(frame, method, error, is_taken): &(u32, &str, f64, bool)| json!({ "frame": frame, "method": method, "error": error, "taken": is_taken });
+            let trial = |one: &(u32, &str, f64, bool)| {
+                let (frame, method, error, is_taken) = *one;
+                json!({ "frame": frame, "method": method, "error": error, "taken": is_taken })
+            };
             let report = json!({
                 "takes": own.takes.map_or("exact", |candidate| candidate.name),
                 "why": own.why,
