@@ -4,6 +4,7 @@ pub mod alias;
 pub mod angles;
 pub mod blue_noise;
 pub mod exact;
+pub mod median;
 pub mod octahedral;
 pub mod random;
 pub mod sampling;

@@ -2,6 +2,7 @@
 //! is where a later start goes on.
 
 use crate::kernels::DeviceInfo;
+pub use crate::math::median::median;
 use crate::output::atomic::JsonLines;
 use crate::session::device::Device;
 use crate::settings::Adapter;
@@ -166,11 +167,4 @@ impl Rows {
     pub fn value(&self, key: &str, name: &str) -> Option<f64> {
         self.all().iter().find(|row| row.key == key)?.values.get(name).copied()
     }
-}
-
-/// The median; the mean of the middle two of an even number.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    Some(0.5 * (values[last / 2] + values[last.div_ceil(2)]))
 }

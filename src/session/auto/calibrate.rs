@@ -6,6 +6,7 @@ use super::error;
 use super::rates::{MethodRate, Rates, device_key};
 use crate::counters::Record;
 use crate::frame::{Captures, FrameOutput, FrameWatch, Methods, RenderError, Renderer};
+use crate::math::median::median;
 use crate::scene::CameraPath;
 use crate::secondary::Method;
 use crate::secondary::dvf::Options;
@@ -108,7 +109,7 @@ pub fn measure(file: &Path, settings: &Settings, progress: &mut Progress) -> Res
         primary.append(&mut ways[0].primary);
         note(&mut rates, effect, &ways);
     }
-    rates.primary = median(primary);
+    rates.primary = median(primary).unwrap_or(0.0);
     Ok(Measured { device, scene: scene.checksum(), rates })
 }
 
@@ -239,7 +240,7 @@ fn note(rates: &mut Rates, effect: &str, ways: &[Way]) {
     let Some(rays) = ways.first().map(|exact| exact.rays) else { return };
     let seen: Vec<usize> =
         (0..VIEWS as usize).filter(|&view| rays[1][view] > 0.0 && rays[0][view] > rays[1][view]).collect();
-    let time = |way: &Way, size: usize, view: usize| median(way.seconds[size][view].clone());
+    let time = |way: &Way, size: usize, view: usize| median(way.seconds[size][view].clone()).unwrap_or(0.0);
     for way in ways {
         let Some(candidate) = way.candidate else {
             let ray = seen.iter().map(|&view| time(way, 0, view) / rays[0][view]);
@@ -274,9 +275,4 @@ fn seconds_a_byte(renderer: &mut Renderer, path: &CameraPath) -> Result<f64, Ren
     let bytes: u64 = records.iter().map(Record::loaded_bytes).sum();
     let seconds = records.iter().map(|record| record.ms_stream * 1e-3).sum::<f64>();
     Ok(if bytes == 0 { 0.0 } else { seconds / bytes as f64 })
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
