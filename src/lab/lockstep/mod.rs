@@ -4,7 +4,8 @@
 //! Rays that start at hits are within [`Lockstep::bound`] of each other, because WGSL leaves sine, cosine, division and
 //! inverse square root some ulps; the device's are then given to both, so that everything that follows can be compared
 //! exactly: hits, surfaces, lists, what is asked and counted, bit for bit. Widths of their cones are compared and
-//! given likewise. What is read and added for shading is
+//! given likewise. Where rays of a tile can first enter a box orders what is done and decides no hit: devices divide and
+//! fuse there as they like, and it is compared within a bound. What is read and added for shading is
 //! compared within the bound; before textures are looked up both are given the device's, so that which tiles are asked
 //! for and read can be compared exactly.
 
@@ -13,7 +14,9 @@ mod tests;
 use crate::cpu::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
 use crate::kernels::dispatch::dispatches;
-use crate::kernels::layout::{DvfGrid, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList};
+use crate::kernels::layout::{
+    DvfGrid, Entry, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList,
+};
 use crate::kernels::table::Family;
 use crate::kernels::trace::levels::spread_of;
 use crate::kernels::{DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Tuning, View};
@@ -81,6 +84,10 @@ pub struct Lockstep {
 /// more sensitive to roundings than they are.
 const SPREADS: f32 = 1.0 / 1024.0;
 
+/// Greatest difference of distances at which boxes can be entered: of coordinates in the thousands a unit in the last
+/// place, where the distance is below 1.
+const NEAREST: f32 = 1.0 / 4096.0;
+
 impl Findings {
     fn note(&mut self, text: impl FnOnce() -> String) {
         if self.differences.len() < 8 {
@@ -118,6 +125,14 @@ impl Findings {
         }
     }
 
+    /// Compares distances at which boxes can be entered.
+    fn nearest(&mut self, context: &str, gpu: &[f32], cpu: &[f32]) {
+        // Two that are infinite have no difference.
+        let apart = |(g, c): (&f32, &f32)| if g.to_bits() == c.to_bits() { (0.0, 0.0) } else { (*g, *c) };
+        let (gpu, cpu): (Vec<f32>, Vec<f32>) = gpu.iter().zip(cpu).map(apart).unzip();
+        self.numbers("nearest", context, NEAREST, &gpu, &cpu);
+    }
+
     fn gbuffers(&mut self, context: &str, bound: f32, gpu: &[GBuffer], cpu: &[GBuffer]) {
         let numbers = |g: &GBuffer| {
             let others = [g.handedness, g.occlusion, g.metallic, g.roughness];
@@ -153,10 +168,12 @@ impl Findings {
             compared.map(|(_, count)| count).chain(own).chain(r.own).collect::<Vec<u64>>()
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
-        let demand = |r: &Report| -> Vec<[u32; 4]> {
-            r.demand.iter().map(|d| [d.brick, d.rays, d.nearest.to_bits(), d.next]).collect()
+        let demand = |r: &Report| -> (Vec<[u32; 3]>, Vec<f32>) {
+            r.demand.iter().map(|d| ([d.brick, d.rays, d.next], d.nearest)).unzip()
         };
-        self.words("demands", context, &demand(gpu), &demand(cpu));
+        let (of_gpu, of_cpu) = (demand(gpu), demand(cpu));
+        self.words("demands", context, &of_gpu.0, &of_cpu.0);
+        self.nearest(context, &of_gpu.1, &of_cpu.1);
         let tiles = |r: &Report| -> Vec<[u32; 4]> {
             r.tiles.iter().map(|t| [t.tile, t.rays, t.first, t.is_used.into()]).collect()
         };
@@ -292,7 +309,10 @@ impl Lockstep {
             findings.words("rooted tiles", context, &places, &rooted);
             let held: u32 = lists.iter().map(|l| l.count).sum();
             let held = (held as usize).min(own.list.len());
-            findings.words("entries", context, &list[..held], &own.list[..held]);
+            let entries = |list: &[Entry]| -> (Vec<u32>, Vec<f32>) { list.iter().map(|e| (e.node, e.near)).unzip() };
+            let (of_gpu, of_cpu) = (entries(&list[..held]), entries(&own.list[..held]));
+            findings.words("entries", context, &of_gpu.0, &of_cpu.0);
+            findings.nearest(context, &of_gpu.1, &of_cpu.1);
             for l in &lists {
                 let range = l.first as usize..(l.first + l.selected) as usize;
                 if own.selection.len() >= range.end {

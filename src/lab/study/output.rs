@@ -14,7 +14,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Methods in the order of their colours.
-const METHODS: [&str; 9] = ["exact", "roma", "levels", "sift", "df", "denoised", "dvf", "displacement", "threshold"];
+const METHODS: [&str; 10] =
+    ["exact", "roma", "levels", "sift", "df", "denoised", "dvf", "displacement", "threshold", "taa"];
 /// Errors within which the fastest setting is named.
 const WITHIN: [f64; 3] = [0.02, 0.05, 0.1];
 /// Frames over which what is made before them is shared.

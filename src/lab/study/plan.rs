@@ -74,7 +74,8 @@ pub fn ways(effect: Effect, has: Has, is_quick: bool) -> Vec<Way> {
             );
         }
         ways.push(usual("roma", format!("--secondary {name}=roma --roma-unsnapped all")));
-        ways.push(Way::new("roma", 1, format!("--secondary {name}=roma --denoise")));
+        // Zeng et al.'s: one ray, a denoiser, and frames put together.
+        ways.push(Way::new("roma", 1, format!("--secondary {name}=roma --denoise --taa")));
     }
     if has.occupancy && matches!(effect, Effect::Ao | Effect::Shadow) {
         ways.extend([2, 5, 10].map(|percent| usual("sift", format!("--secondary {name}=sift --auto-error {percent}"))));
@@ -103,6 +104,8 @@ pub fn ways(effect: Effect, has: Has, is_quick: bool) -> Vec<Way> {
         ways.extend(["0.5", "1", "2", "4"].map(|pixels| usual("levels", format!("--lod {pixels}"))));
     }
     ways.extend([1, USUAL].map(|rays| Way::new("denoised", rays, "--denoise")));
+    ways.push(Way::new("denoised", 1, "--denoise --taa"));
+    ways.push(Way::new("taa", 1, "--taa"));
     ways
 }
 
@@ -279,7 +282,9 @@ mod tests {
                     let is_same = |other: &Way| other.method == "exact" && other.rays == way.rays;
                     assert!(ways.iter().any(is_same), "{effect}: no exact rays beside {way:?}");
                 }
-                assert!(ways.iter().any(|way| !["exact", "denoised", "levels", "threshold"].contains(&way.method)));
+                assert!(
+                    ways.iter().any(|way| !["exact", "denoised", "taa", "levels", "threshold"].contains(&way.method))
+                );
             }
         }
     }

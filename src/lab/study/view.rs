@@ -25,6 +25,9 @@ use std::sync::Arc;
 use std::time::Instant;
 use tempfile::TempDir;
 
+/// Frames of a still camera before a picture by a filter that looks back at them.
+const BEFORE: u32 = 7;
+
 /// What is common to all pictures of a study.
 #[derive(Clone, Copy)]
 pub struct Place<'a> {
@@ -68,7 +71,6 @@ pub struct Party {
     /// Seconds that were spent before its first picture: on a field of visibility.
     pub making: f64,
     methods: Methods,
-    resolve: Resolve,
 }
 
 /// A picture.
@@ -164,18 +166,19 @@ impl<'a> View<'a> {
             making = kept.map_or_else(|| start.elapsed().as_secs_f64(), |kept| kept.1);
             fields.made.insert(key, (file, making));
         }
-        let resolve = Resolve::new(settings.denoise, settings.taa);
-        Ok(Party { way: way.clone(), settings, making, methods: own, resolve })
+        Ok(Party { way: way.clone(), settings, making, methods: own })
     }
 
     /// A picture by a way; `is_cold`: beginning with an empty cache, and without what it has made for other pictures.
+    /// Where filters look back at frames, it is the last of some that a still camera sees by rays of their own, and the
+    /// time is that of the last; a cold one is the first.
     ///
     /// # Errors
     /// A brick that cannot be read; the device's; pixels that are not finite; the run is to come to an end.
     pub fn picture(&mut self, party: &mut Party, samples: u32, seed: u64, is_cold: bool) -> Result<Picture> {
         let console = self.place.console;
         console.go_on()?;
-        let (number, camera, file) = (self.number, self.camera, self.place.file);
+        let (number, camera, file, views) = (self.number, self.camera, self.place.file, self.place.scale.views);
         let settings = Settings { spp: party.settings.spp * samples, seed, ..party.settings.clone() };
         let renderer = self.side(&settings)?;
         if is_cold {
@@ -187,16 +190,25 @@ impl<'a> View<'a> {
         let schedule = if settings.query_threshold > 0 { Schedule::Chc } else { settings.schedule };
         renderer.settings = render_settings(&settings, schedule);
         renderer.executor.tuning().threshold = scaled_threshold(settings.query_threshold, renderer.tile);
-        std::mem::swap(&mut renderer.methods, &mut party.methods);
-        let start = Instant::now();
-        let output = renderer.frame_watched(number, &camera, &[], &mut UntilStopped(console));
-        std::mem::swap(&mut renderer.methods, &mut party.methods);
-        if matches!(output, Err(RenderError::Interrupted)) {
-            return Err(Stopped.into());
+        let mut resolve = Resolve::new(settings.denoise, settings.taa);
+        let looks_back = (settings.denoise || settings.taa) && !is_cold;
+        let before = if looks_back { BEFORE } else { 0 };
+        let (mut start, mut last) = (Instant::now(), None);
+        // Of all views, no two frames have the same number: it chooses the rays.
+        for number in (0..=before).rev().map(|back| number + back * views) {
+            std::mem::swap(&mut renderer.methods, &mut party.methods);
+            start = Instant::now();
+            let output = renderer.frame_watched(number, &camera, &[], &mut UntilStopped(console));
+            std::mem::swap(&mut renderer.methods, &mut party.methods);
+            if matches!(output, Err(RenderError::Interrupted)) {
+                return Err(Stopped.into());
+            }
+            let mut output = output.with_context(|| file.display().to_string())?;
+            resolve.frame(&mut output);
+            last = Some(output);
         }
-        let mut output = output.with_context(|| file.display().to_string())?;
-        party.resolve.frame(&mut output);
         let seconds = start.elapsed().as_secs_f64();
+        let output = last.context("a picture has a frame")?;
         if output.records.iter().any(|record| record.non_finite > 0) {
             bail!("{}: {:?}: pixels were not finite; this is a bug in brickwalk", file.display(), party.way);
         }

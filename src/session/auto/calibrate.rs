@@ -16,6 +16,7 @@ use crate::session::{Session, Settings};
 use crate::settings::{CacheSize, ErrorLimit, ImageSize};
 use anyhow::{Context, Result};
 use bricks::Resident;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -45,6 +46,8 @@ struct Way {
     candidate: Option<&'static Candidate>,
     methods: Methods,
     making: f64,
+    /// Seconds by which its first frame took longer than one after it: kernels were compiled.
+    compiling: Option<f64>,
     /// Seconds by size and view.
     seconds: [[Vec<f64>; VIEWS as usize]; 2],
     /// By size and view: nothing more is to be measured.
@@ -89,6 +92,8 @@ pub fn measure(file: &Path, settings: &Settings, progress: &mut Progress) -> Res
     let folder = tempfile::tempdir()?;
     let field = folder.path().join("field.dvf");
     let mut primary = Vec::new();
+    // Effects share kernels: what compiles them is measured with whatever needs them first.
+    let mut compiling = BTreeMap::new();
     for (number, effect) in (0..).zip(EFFECTS) {
         let mut ways = vec![Way::exact()];
         for candidate in possible(effect, scene.resident()) {
@@ -107,7 +112,13 @@ pub fn measure(file: &Path, settings: &Settings, progress: &mut Progress) -> Res
             }
         }
         primary.append(&mut ways[0].primary);
-        note(&mut rates, effect, &ways);
+        for way in &ways {
+            if let (Some(candidate), Some(seconds)) = (way.candidate, way.compiling) {
+                let most = compiling.entry(candidate.method).or_insert(0.0f64);
+                *most = most.max(seconds);
+            }
+        }
+        note(&mut rates, effect, &ways, &compiling);
     }
     rates.primary = median(primary).unwrap_or(0.0);
     Ok(Measured { device, scene: scene.checksum(), rates })
@@ -137,8 +148,14 @@ impl Place<'_> {
                     if way.needs_field() {
                         self.make_field(renderer, way)?;
                     }
-                    let records = way.frame(renderer, view as u32, self.path, going)?.records;
+                    let is_new = way.compiling.is_none();
+                    let mut frame = || way.frame(renderer, view as u32, self.path, going);
+                    let first = if is_new { Some(frame()?.records) } else { None };
+                    let records = frame()?.records;
                     let seconds = super::seconds_of(self.effect, &records);
+                    if let Some(first) = first {
+                        way.compiling = Some((super::seconds_of(self.effect, &first) - seconds).max(0.0));
+                    }
                     if way.candidate.is_none() {
                         exact = seconds;
                         let own = records.iter().find(|record| record.pass == self.effect);
@@ -203,6 +220,7 @@ impl Way {
             candidate: None,
             methods: Methods::default(),
             making: 0.0,
+            compiling: None,
             seconds: Default::default(),
             is_told: Default::default(),
             rays: Default::default(),
@@ -236,7 +254,8 @@ impl Way {
 }
 
 /// Notes the rates of an effect: of views that tell different ones the least of exact rays and the most of methods.
-fn note(rates: &mut Rates, effect: &str, ways: &[Way]) {
+/// `compiling`: seconds that the kernels of methods take before their first frame.
+fn note(rates: &mut Rates, effect: &str, ways: &[Way], compiling: &BTreeMap<Method, f64>) {
     let Some(rays) = ways.first().map(|exact| exact.rays) else { return };
     let seen: Vec<usize> =
         (0..VIEWS as usize).filter(|&view| rays[1][view] > 0.0 && rays[0][view] > rays[1][view]).collect();
@@ -264,7 +283,11 @@ fn note(rates: &mut Rates, effect: &str, ways: &[Way]) {
         if seen.is_empty() || !percent.iter().chain(&flip_error).all(|error| error.is_finite()) {
             continue;
         }
-        let (effect, name, making) = (effect.into(), candidate.name.into(), way.making);
+        let (effect, name, making) = (
+            effect.into(),
+            candidate.name.into(),
+            way.making + compiling.get(&candidate.method).copied().unwrap_or(0.0),
+        );
         rates.methods.push(MethodRate { effect, name, making, sample: sample.max(0.0), ray, percent, flip_error });
     }
 }

@@ -16,7 +16,8 @@ const READING: &str = "Fewer rays: rays to the environment without a field ÷ th
                        Errors are in linear radiance, FLIP at 67 pixels per degree. Paper: Günay and Akyüz 2025, \
                        Sponza, 128 rays per pixel, an RTX 4060.";
 const MAKING: &str = "Making ÷ exact: time to make the field ÷ time of the rays of a picture without one. Making and \
-                      picture ÷ exact: a picture with a field made for it ÷ one without. Shares of making: areas and \
+                      picture ÷ exact: a picture with a field made for it ÷ one without. Pays after: making ÷ what \
+                      a picture saves; none where it saves nothing. Shares of making: areas and \
                       sums are the paper's compute shaders 1 to 3, points and rays shader 4, labels shader 5. The \
                       paper's tables 3 and 4 are not compared with rays: they imply 2e12 rays per second.";
 const FLICKERING: &str = "Change of pictures with a field from frame to frame, over pixels whose rays all have the \
@@ -119,6 +120,12 @@ impl Line<'_> {
         Value::Of(own / (1e-3 * value("exact_ms")).max(f64::MIN_POSITIVE), '×')
     }
 
+    /// Pictures after which the field has saved what making it took; none where it saves nothing.
+    fn pays_after(&self) -> Option<f64> {
+        let saved = 1e-3 * (self.value("exact_ms")? - self.value("ms")?);
+        (saved > 0.0).then_some(self.value("seconds")? / saved)
+    }
+
     /// A share of the time of making, per cent.
     fn share(&self, name: &str) -> Value {
         let [own, making] = [name, "seconds"].map(|name| self.value(name).unwrap_or(0.0));
@@ -188,11 +195,12 @@ fn columns<'a>(stage: Stage) -> Vec<Column<Line<'a>>> {
 
 /// What making the fields of the points takes.
 fn making<'a>() -> Vec<Column<Line<'a>>> {
-    let all: [Column<Line>; 10] = [
+    let all: [Column<Line>; 11] = [
         ("making ÷ exact", |line| line.making(false)),
         ("making ÷ exact, paper", |line| Value::ratio(line.paper_making(0))),
         ("making and picture ÷ exact", |line| line.making(true)),
         ("making and picture ÷ exact, paper", |line| Value::ratio(line.paper_making(1))),
+        ("pays after, pictures", |line| Value::number(line.pays_after())),
         ("areas and sums, %", |line| line.share("seconds_areas")),
         ("areas and sums, %, paper", |line| percent(line.paper_making(2))),
         ("points and rays, %", |line| line.share("seconds_rays")),
@@ -217,4 +225,19 @@ fn flicker<'a>() -> Vec<Column<Line<'a>>> {
         ("pixels that jump in the worst frame, %", |line| percent(line.value("jumps"))),
     ];
     [&first(), &all[..]].concat()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::bench::results::{heads, published};
+
+    #[test]
+    fn pages_leave_out_no_column() {
+        let of = |stage: &Stage| if *stage == Stage::Flicker { flicker() } else { columns(*stage) };
+        let mut all: Vec<_> = Stage::ALL.iter().map(|stage| (stage.name(), heads(&of(stage)))).collect();
+        all.push(("making", heads(&making())));
+        let found = published("dvf", &all);
+        assert!(["points", "making"].iter().all(|name| found.contains(*name)), "{found:?}");
+    }
 }

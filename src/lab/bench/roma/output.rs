@@ -155,9 +155,10 @@ fn paper(way: Way) -> Option<[f64; 2]> {
 
 const SPEED: &str = "Device time to make the maps or the distance field of a frame (generation) and to answer its rays \
                      (tracing); of exact rays, wall time of the pass. exact ÷ and df ÷ are speed-ups: above 1 ROMA is \
-                     faster. df is a distance field with as many cells.";
+                     faster. df is a distance field with as many cells. Whole: wall time of the pass, with all that it \
+                     needs; the first way of a size makes base maps anew, the second of that size finds them.";
 
-fn speed<'a>() -> [Column<Measurement<'a>>; 14] {
+fn speed<'a>() -> [Column<Measurement<'a>>; 16] {
     [
         ("scene", |line| line.job.scene.name().into()),
         ("way", |line| line.way.to_string().into()),
@@ -173,6 +174,8 @@ fn speed<'a>() -> [Column<Measurement<'a>>; 14] {
         ("df ÷ both, paper", |line| field_over(line.way, BOTH, paper)),
         ("ns a ray", |line| Value::number(line.per_ray())),
         ("exact ÷ tracing", |line| Value::ratio(line.exact_over())),
+        ("whole, ms", |line| Value::number(line.value("ms"))),
+        ("exact ÷ whole", |line| Value::ratio(ratio(line.of(Way::Exact).value("ms"), line.value("ms")))),
     ]
 }
 
@@ -343,4 +346,21 @@ fn error_over_time(job: &Job, rows: &Rows) -> Graph {
         lines.map(|(name, of)| (name.to_string(), job.ways.iter().filter(|way| of(way)).filter_map(point).collect()));
     let reading = "Hundredths of FLIP against milliseconds of ao in a frame, the making of maps as well.";
     plot(format!("Error over time, {}", job.variant), reading, "ms", Unit::Percent, lines.to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lab::bench::results::{heads, published};
+
+    #[test]
+    fn pages_leave_out_no_column() {
+        let of = |stage: &Stage| match stage {
+            Stage::Speed => Some(heads(&speed())),
+            Stage::Seams | Stage::Leaks => None,
+            stage => Some(heads(&errors(*stage))),
+        };
+        let all: Vec<_> = Stage::ALL.iter().filter_map(|stage| Some((stage.name(), of(stage)?))).collect();
+        assert!(published("roma", &all).contains("speed"));
+    }
 }
