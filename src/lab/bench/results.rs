@@ -88,8 +88,7 @@ impl<'a> Results<'a> {
                 if !["", self.reading].contains(&table.caption.as_str()) {
                     let _ = writeln!(text, "\n{}", table.caption);
                 }
-                // Pages that hold the table keep this line: tests compare their columns.
-                let _ = write!(text, "\n<!-- bench {} {} -->\n\n{}", self.name, table.name, table.to_markdown());
+                let _ = write!(text, "\n{}", table.to_markdown());
             }
         }
         atomic::write(&folder.join(format!("{}.md", self.name)), text.as_bytes())?;

@@ -4,10 +4,10 @@
 //! Rays that start at hits are within [`Lockstep::bound`] of each other, because WGSL leaves sine, cosine, division and
 //! inverse square root some ulps; the device's are then given to both, so that everything that follows can be compared
 //! exactly: hits, surfaces, lists, what is asked and counted, bit for bit. Widths of their cones are compared and
-//! given likewise. Where rays of a tile can first enter a box orders what is done and decides no hit: devices divide and
-//! fuse there as they like, and it is compared within a bound. What is read and added for shading is
-//! compared within the bound; before textures are looked up both are given the device's, so that which tiles are asked
-//! for and read can be compared exactly.
+//! given likewise. Where rays of a tile can first enter a box orders what is done and decides no hit: devices divide
+//! and fuse there as they like, and it is compared within a bound. What is read and added for shading is compared
+//! within the bound; before textures are looked up both are given the device's, so that which tiles are asked for and
+//! read can be compared exactly.
 
 mod tests;
 
