@@ -6,10 +6,9 @@ use crate::frame::{Displaced, Engine, Plan, Secondary};
 use crate::kernels::View;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass};
-use crate::secondary::occupancy::{BaseMaps, Cascades, Source};
+use crate::secondary::occupancy::{BaseMaps, Source};
 use crate::secondary::{EffectMethods, Method};
 use serde_json::{Value, json};
-use std::sync::Arc;
 
 /// Rays answered by distance fields.
 pub struct Df {
@@ -18,14 +17,12 @@ pub struct Df {
     chosen: EffectMethods,
     /// The base maps.
     pub base: BaseMaps,
-    /// What the fields that the executor has were made of.
-    made: Option<Arc<Cascades>>,
 }
 
 impl Df {
     /// With base maps that are made of `source`.
     pub fn new(settings: Options, chosen: EffectMethods, source: Source) -> Self {
-        Self { settings, chosen, base: BaseMaps::new(source), made: None }
+        Self { settings, chosen, base: BaseMaps::new(source) }
     }
 
     /// Look-ups of a ray of `pass` at most; `None` where rays are traced.
@@ -56,9 +53,7 @@ impl Secondary for Df {
         let cascades = self.base.assemble(&engine.scene, size, size)?.clone();
         let Some(view) = self.base.view() else { return Ok(()) };
         let maps = DfMaps::new(&cascades, &view.frame, &self.settings);
-        maps.give(&mut *engine.executor)?;
-        if self.made.as_ref().is_none_or(|made| !Arc::ptr_eq(made, &cascades)) {
-            self.made = Some(cascades);
+        if maps.give(&mut *engine.executor)? {
             plan.before.extend(maps.make());
         }
         plan.before.push(maps.trace(steps));

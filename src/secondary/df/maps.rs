@@ -44,11 +44,11 @@ impl DfMaps {
     }
 
     /// Gives an executor the base maps, unless it has them, and places the fields. Those that were made last stay as
-    /// long as their maps do.
+    /// long as their maps do: returns whether they are to be made.
     ///
     /// # Errors
     /// More than the device holds in one buffer, with how much it does.
-    pub fn give(&self, executor: &mut dyn FrameExecutor) -> Result<(), ExecutorError> {
+    pub fn give(&self, executor: &mut dyn FrameExecutor) -> Result<bool, ExecutorError> {
         let held = executor.held(&FAMILY).as_ref().and_then(|held| held.downcast_ref::<Arc<Cascades>>());
         let is_held = held.is_some_and(|held| Arc::ptr_eq(held, &self.cascades));
         let boms = self.cascades.levels.iter().map(|bom| bom.words().len()).sum();
@@ -63,7 +63,7 @@ impl DfMaps {
             }
             *executor.held(&FAMILY) = Some(Box::new(self.cascades.clone()));
         }
-        Ok(())
+        Ok(!is_held)
     }
 
     /// Words of the nearest cells that flooding keeps: those of one field, twice.

@@ -12,6 +12,7 @@ use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass};
 use crate::secondary::{EffectMethods, Method};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// Of how many rays asked in a frame so much is left in the next.
 const FADE: f64 = 0.5;
@@ -33,13 +34,25 @@ pub struct Displacement {
     placed: Option<(Frame, Carriers)>,
     /// How often fields were exchanged.
     exchanges: u64,
+    /// What the executor holds when all that is there is this one's.
+    mark: Arc<()>,
 }
 
 impl Displacement {
     /// By the fields of `library`.
     pub fn new(settings: Options, chosen: EffectMethods, library: Library) -> Self {
         let asked = vec![0.0; library.fields.len()];
-        Self { settings, chosen, library, held: None, asked, frame: None, placed: None, exchanges: 0 }
+        Self {
+            settings,
+            chosen,
+            library,
+            held: None,
+            asked,
+            frame: None,
+            placed: None,
+            exchanges: 0,
+            mark: Arc::default(),
+        }
     }
 
     /// Whether fields answer the rays of a pass.
@@ -57,6 +70,13 @@ impl Displacement {
     /// Gives the executor what it lacks; what the kernel is told.
     fn give(&mut self, engine: &mut Engine) -> Result<DisplacementOwn, ExecutorError> {
         let Self { settings, library, .. } = self;
+        // Another may have used the executor since.
+        let held = engine.executor.held(&FAMILY);
+        let mark = held.as_ref().and_then(|held| held.downcast_ref::<Arc<()>>());
+        if mark.is_none_or(|mark| !Arc::ptr_eq(mark, &self.mark)) {
+            *held = Some(Box::new(self.mark.clone()));
+            (self.held, self.placed) = (None, None);
+        }
         if self.held.is_none() {
             let chosen = library.most_useful(&self.asked, settings.memory);
             library.give(&engine.scene, &chosen, &mut *engine.executor)?;

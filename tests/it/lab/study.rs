@@ -139,10 +139,15 @@ fn rows_say_what_commands_render() {
     };
     assert!(number(exact(16), "noise_flip") < number(exact(1), "noise_flip"), "more rays are nearer");
     // What the commands render is as far apart as the row says; bytes of a PNG are rounded.
-    let roma = found.iter().find(|row| row["method"] == "roma" && row["rays_per_pixel"] == 4).expect("maps");
-    let [own, same] = [roma, exact(4)].map(|row| rendered(folder.path(), row));
-    let flip = flip_ldr(&own, &same, PIXELS_PER_DEGREE).expect("pictures").mean();
-    assert!((flip - number(roma, "flip_same")).abs() < 2e-3, "{flip} and {roma}");
+    let first = |method: &str| {
+        found.iter().find(|row| row["method"] == method && row["rays_per_pixel"] == 4).expect("a row of the method")
+    };
+    let roma = first("roma");
+    let same = rendered(folder.path(), exact(4));
+    for row in [roma, first("df")] {
+        let flip = flip_ldr(&rendered(folder.path(), row), &same, PIXELS_PER_DEGREE).expect("pictures").mean();
+        assert!((flip - number(row, "flip_same")).abs() < 2e-3, "{flip} and {row}");
+    }
     // The settings are those of the command.
     let text = roma["command"].as_str().expect("a command").split_once("--quality exact").expect("options").1;
     let parsed = settings(text);
