@@ -12,6 +12,8 @@ pub mod displacement;
 pub mod dvf;
 pub mod executors;
 pub mod lod;
+#[cfg(test)]
+mod published;
 pub(super) mod results;
 pub mod roma;
 pub(super) mod runner;

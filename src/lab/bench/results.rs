@@ -130,36 +130,6 @@ pub fn table<R>(name: &str, caption: &str, rows: impl IntoIterator<Item = R>, co
     }
 }
 
-/// That no page of `docs/results` leaves out a column of a table of a bench: a line `<!-- bench NAME TABLE -->` stands
-/// above each. `tables`: all of the bench's, with their columns' heads; returns those that are published.
-#[cfg(test)]
-pub fn published(bench: &str, tables: &[(&str, Vec<&str>)]) -> std::collections::BTreeSet<String> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results");
-    let mut found = std::collections::BTreeSet::new();
-    for page in std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()) {
-        if page.extension().is_none_or(|extension| extension != "md") {
-            continue;
-        }
-        let text = std::fs::read_to_string(&page).unwrap();
-        for part in text.split(&format!("<!-- bench {bench} ")).skip(1) {
-            let (name, rest) = part.split_once(" -->").unwrap();
-            let own = tables.iter().find(|(own, _)| *own == name);
-            let (_, wanted) = own.unwrap_or_else(|| panic!("{}: no table {name}", page.display()));
-            let head = rest.trim_start().lines().next().unwrap_or_default();
-            let heads: Vec<&str> = head.trim().trim_matches('|').split('|').map(str::trim).collect();
-            assert_eq!(heads, *wanted, "{}: columns of {name}", page.display());
-            found.insert(name.to_owned());
-        }
-    }
-    found
-}
-
-/// The heads of columns.
-#[cfg(test)]
-pub fn heads<R>(columns: &[Column<R>]) -> Vec<&'static str> {
-    columns.iter().map(|(head, _)| *head).collect()
-}
-
 /// `value` times a hundred.
 pub fn percent(value: Option<f64>) -> Value {
     Value::number(value.map(|value| 100.0 * value))

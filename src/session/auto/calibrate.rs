@@ -283,11 +283,8 @@ fn note(rates: &mut Rates, effect: &str, ways: &[Way], compiling: &BTreeMap<Meth
         if seen.is_empty() || !percent.iter().chain(&flip_error).all(|error| error.is_finite()) {
             continue;
         }
-        let (effect, name, making) = (
-            effect.into(),
-            candidate.name.into(),
-            way.making + compiling.get(&candidate.method).copied().unwrap_or(0.0),
-        );
+        let making = way.making + compiling.get(&candidate.method).copied().unwrap_or(0.0);
+        let (effect, name) = (effect.into(), candidate.name.into());
         rates.methods.push(MethodRate { effect, name, making, sample: sample.max(0.0), ray, percent, flip_error });
     }
 }

@@ -277,7 +277,7 @@ fn scale(measured: &Measured) -> Table {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::bench::results::{heads, published};
+    use crate::lab::bench::published::{heads, published};
 
     #[test]
     fn pages_leave_out_no_column() {

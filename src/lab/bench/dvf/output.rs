@@ -16,10 +16,10 @@ const READING: &str = "Fewer rays: rays to the environment without a field ÷ th
                        Errors are in linear radiance, FLIP at 67 pixels per degree. Paper: Günay and Akyüz 2025, \
                        Sponza, 128 rays per pixel, an RTX 4060.";
 const MAKING: &str = "Making ÷ exact: time to make the field ÷ time of the rays of a picture without one. Making and \
-                      picture ÷ exact: a picture with a field made for it ÷ one without. Pays after: making ÷ what \
-                      a picture saves; none where it saves nothing. Shares of making: areas and \
-                      sums are the paper's compute shaders 1 to 3, points and rays shader 4, labels shader 5. The \
-                      paper's tables 3 and 4 are not compared with rays: they imply 2e12 rays per second.";
+                      picture ÷ exact: a picture with a field made for it ÷ one without. Pays after: making ÷ what a \
+                      picture saves; none where it saves nothing. Shares of making: areas and sums are the paper's \
+                      compute shaders 1 to 3, points and rays shader 4, labels shader 5. The paper's tables 3 and 4 \
+                      are not compared with rays: they imply 2e12 rays per second.";
 const FLICKERING: &str = "Change of pictures with a field from frame to frame, over pixels whose rays all have the \
                           same answers in both frames. Noise: difference of two exact pictures with other rays. A \
                           pixel jumps if it changes by more than 99 of 100 pixels differ by noise. Anew: the field is \
@@ -230,7 +230,7 @@ fn flicker<'a>() -> Vec<Column<Line<'a>>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::bench::results::{heads, published};
+    use crate::lab::bench::published::{heads, published};
 
     #[test]
     fn pages_leave_out_no_column() {

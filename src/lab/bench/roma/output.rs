@@ -351,7 +351,7 @@ fn error_over_time(job: &Job, rows: &Rows) -> Graph {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lab::bench::results::{heads, published};
+    use crate::lab::bench::published::{heads, published};
 
     #[test]
     fn pages_leave_out_no_column() {
