@@ -2,7 +2,7 @@
 
 use super::cached;
 use super::options::args::WalkArgs;
-use super::watcher::Watcher;
+use super::watcher::{UntilStopped, Watcher};
 use crate::cli::output::{is_quiet, note, print, warn};
 use crate::counters::{COLUMNS, Column, Kind, Record};
 use crate::output::atomic;
@@ -76,7 +76,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     }
     progress.finish();
     let (video, commands) = pictures.finish()?;
-    let left_out = session.left_out()?;
+    let left_out = session.left_out(&mut UntilStopped(stop))?;
     let summary = summary::summary(&mut session, &records, left_out, video);
     atomic::write(&output.join("summary.json"), (serde_json::to_string_pretty(&summary)? + "\n").as_bytes())?;
     session.write_requests()?;

@@ -90,6 +90,15 @@ impl Watch for Watcher<'_> {
     }
 }
 
+/// Lets work go on until the program is to end; shows nothing of it.
+pub struct UntilStopped<'a>(pub &'a AtomicBool);
+
+impl FrameWatch for UntilStopped<'_> {
+    fn passes(&mut self, _: u32, _: u32) -> bool {
+        !self.0.load(Ordering::Relaxed)
+    }
+}
+
 /// Says that a walk takes `whole`, and what would shorten it.
 fn long(settings: &Settings, whole: Duration) -> String {
     let (frames, spp, effects) = (settings.frames, settings.samples(), settings.effects);

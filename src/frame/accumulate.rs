@@ -6,29 +6,41 @@
 //! these sums in f64: the error is that of one batch, γ₆₃ < 4 · 10⁻⁶, however many there are.
 
 pub use crate::kernels::layout::BATCH_SAMPLES;
+use rayon::prelude::*;
 
 /// The samples of a frame so far.
 #[derive(Clone, Debug, Default)]
 pub struct Accumulation {
-    /// Sums of radiance per pixel; w counts samples.
+    /// The first batch: radiance per pixel, w the number of samples.
+    first: Vec<[f32; 4]>,
+    /// The sums of all batches, where there are more.
     sums: Vec<[f64; 4]>,
 }
 
 impl Accumulation {
     /// Adds a batch that a device has summed: radiance per pixel, w the number of samples.
-    pub fn add(&mut self, batch: &[[f32; 4]]) {
-        self.sums.resize(batch.len(), [0.0; 4]);
-        for (sum, batch) in self.sums.iter_mut().zip(batch) {
+    pub fn add(&mut self, batch: Vec<[f32; 4]>) {
+        if self.first.is_empty() {
+            self.first = batch;
+            return;
+        }
+        if self.sums.is_empty() {
+            self.sums = self.first.par_iter().map(|first| first.map(f64::from)).collect();
+        }
+        self.sums.par_iter_mut().zip(&batch).for_each(|(sum, batch)| {
             for (sum, x) in sum.iter_mut().zip(batch) {
                 *sum += f64::from(*x);
             }
-        }
+        });
     }
 
-    /// The mean of the samples. Of one batch it is the quotient in f32: that is the quotient in f64 rounded, as 53 ≥ 2
-    /// · 24 + 2 (Figueroa, "When is Double Rounding Innocuous?", 1995).
+    /// The mean of the samples. Of one batch it is the quotient in f32, which is what that in f64 would be rounded to,
+    /// as 53 ≥ 2 · 24 + 2 (Figueroa, "When is Double Rounding Innocuous?", 1995).
     pub fn mean(&self) -> Vec<[f32; 3]> {
-        self.sums.iter().map(|sum| [0, 1, 2].map(|k| (sum[k] / sum[3]) as f32)).collect()
+        if self.sums.is_empty() {
+            return self.first.par_iter().map(|sum| [0, 1, 2].map(|k| sum[k] / sum[3])).collect();
+        }
+        self.sums.par_iter().map(|sum| [0, 1, 2].map(|k| (sum[k] / sum[3]) as f32)).collect()
     }
 }
 
@@ -37,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_batch_is_divided_as_in_f32() {
+    fn one_batch_is_divided_in_f32_as_in_f64() {
         let mut state = 1u32;
         let mut next = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -48,8 +60,12 @@ mod tests {
             // Any finite float that is not negative, denormals among them.
             let sum = [next() % 0x7f80_0000, next() % 0x0100_0000, next() % 0x4000_0000].map(f32::from_bits);
             let mut all = Accumulation::default();
-            all.add(&[[sum[0], sum[1], sum[2], count]]);
-            assert_eq!(all.mean()[0].map(f32::to_bits), sum.map(|x| (x / count).to_bits()), "{sum:?} / {count}");
+            all.add(vec![[sum[0], sum[1], sum[2], count]]);
+            let in_f64 = sum.map(|x| ((f64::from(x) / f64::from(count)) as f32).to_bits());
+            assert_eq!(all.mean()[0].map(f32::to_bits), in_f64, "{sum:?} / {count}");
+            // A second batch of nothing brings the sums in f64 into use.
+            all.add(vec![[0.0; 4]]);
+            assert_eq!(all.mean()[0].map(f32::to_bits), in_f64, "{sum:?} / {count}");
         }
     }
 
@@ -60,7 +76,7 @@ mod tests {
         let mut one_after_the_other = 0.0f32;
         for _ in 0..1_000_000 / BATCH_SAMPLES {
             let sum = (0..BATCH_SAMPLES).fold(0.0, |sum, _| sum + value);
-            all.add(&[[sum, sum, sum, BATCH_SAMPLES as f32]]);
+            all.add(vec![[sum, sum, sum, BATCH_SAMPLES as f32]]);
             one_after_the_other = (0..BATCH_SAMPLES).fold(one_after_the_other, |sum, _| sum + value);
         }
         assert!((all.mean()[0][0] / value - 1.0).abs() <= 63.0 * 0.5 * f32::EPSILON);

@@ -7,7 +7,7 @@ use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 #[cfg(feature = "lab")]
 use crate::schedule::fronts::{FrontPass, Fronts};
-use crate::schedule::{self, ExecutorError, Pass, Shading, Step, Tracer, Tracing};
+use crate::schedule::{self, ExecutorError, Pass, Report, Shading, Step, Tracer, Tracing};
 use bricks::SceneFile;
 use glam::DVec3;
 use std::ops::Range;
@@ -128,33 +128,41 @@ impl Engine {
         Ok(())
     }
 
-    /// Traces the rays of a pass, which the steps in `first` make, by the schedule in force.
+    /// Traces the rays of a pass, which the steps in `first` make, by the schedule in force, and runs the steps in
+    /// `last`; what these reported is counted, and returned.
     ///
     /// # Errors
     /// A brick that cannot be read, or the device's.
-    pub fn trace(&mut self, frame: u32, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
+    pub fn trace(
+        &mut self,
+        frame: u32,
+        pass: Pass,
+        [first, last]: [&[Step]; 2],
+        stats: &mut Counters,
+    ) -> Result<Report, ExecutorError> {
         let after =
             [(self.settings.clip.is_some(), Step::ClipRays), (self.halves() && pass != Pass::Primary, Step::HalveRays)];
         let after = after.into_iter().filter_map(|(is_on, step)| is_on.then_some(step));
         let first: &[Step] = &first.iter().copied().chain(after).collect::<Vec<_>>();
         if let Some(mut budgeted) = self.budgeted.take() {
-            let done = budgeted.trace(&mut self.tracer(pass, stats), first);
+            let done = budgeted.trace(&mut self.tracer(pass, &[], stats), first);
             self.budgeted = Some(budgeted);
-            return done;
+            done?;
+            return self.run_last(pass, last, stats);
         }
         let schedule = self.settings.schedule;
         if schedule != Schedule::Auto {
-            return self.trace_by(schedule, frame, pass, first, stats);
+            return self.trace_by(schedule, frame, pass, [first, last], stats);
         }
         let chosen = self.auto.choose(pass, self.cache.states.all_geometry_resident());
         let start = Instant::now();
         // Neither loading nor the measurement of needs, which is taken off the pass's time, is a cost of the schedule.
         let besides = stats.ms_stream - stats.ms;
         let rays = stats.rays_traced;
-        self.trace_by(chosen, frame, pass, first, stats)?;
+        let report = self.trace_by(chosen, frame, pass, [first, last], stats)?;
         let ms = start.elapsed().as_secs_f64() * 1e3 - (stats.ms_stream - stats.ms - besides);
         self.auto.note(pass, ms, stats.rays_traced - rays);
-        Ok(())
+        Ok(report)
     }
 
     #[cfg_attr(not(feature = "lab"), expect(unused_variables))]
@@ -163,24 +171,40 @@ impl Engine {
         schedule: Schedule,
         frame: u32,
         pass: Pass,
-        first: &[Step],
+        [first, last]: [&[Step]; 2],
         stats: &mut Counters,
-    ) -> Result<(), ExecutorError> {
+    ) -> Result<Report, ExecutorError> {
         #[cfg(feature = "lab")]
         if let Some(mut fronts) = self.fronts.take_if(|_| schedule == Schedule::Chc) {
             stats.schedule.push(schedule.name());
             let scene = self.scene.clone();
             let setup = FrontPass { resident: scene.resident(), extent: (self.size.0, self.size.1, self.tile), frame };
-            let done = fronts.trace(&mut self.tracer(pass, stats), &setup, first);
+            let done = fronts.trace(&mut self.tracer(pass, &[], stats), &setup, first);
             self.fronts = Some(fronts);
-            return done;
+            done?;
+            return self.run_last(pass, last, stats);
         }
-        schedule::trace(&mut self.tracer(pass, stats), schedule, first)
+        let mut tracer = self.tracer(pass, last, stats);
+        schedule::trace(&mut tracer, schedule, first)?;
+        match tracer.ended {
+            Some(report) => Ok(report),
+            None => self.run_last(pass, last, stats),
+        }
     }
 
-    /// What a schedule works with to trace the rays of a pass.
-    pub fn tracer<'a>(&'a mut self, pass: Pass, stats: &'a mut Counters) -> Tracer<'a> {
+    /// Runs what follows a pass in a submission of its own.
+    fn run_last(&mut self, pass: Pass, last: &[Step], stats: &mut Counters) -> Result<Report, ExecutorError> {
+        if last.is_empty() {
+            return Ok(Report::default());
+        }
+        let report = self.executor.run(pass, last, &self.cache.states)?;
+        stats.add(&report);
+        Ok(report)
+    }
+
+    /// What a schedule works with to trace the rays of a pass, after which the steps in `last` follow.
+    pub fn tracer<'a>(&'a mut self, pass: Pass, last: &'a [Step], stats: &'a mut Counters) -> Tracer<'a> {
         let Self { executor, cache, settings, .. } = self;
-        Tracer { executor: &mut **executor, cache, pass, tracing: &settings.tracing, stats }
+        Tracer { last, ..Tracer::new(&mut **executor, cache, pass, &settings.tracing, stats) }
     }
 }

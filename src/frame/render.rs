@@ -250,7 +250,7 @@ impl Band<'_> {
                 }
             }
             records.pass(engine, "primary", |r, stats| {
-                r.trace(frame, Pass::Primary, &[Step::Generate], stats)?;
+                r.trace(frame, Pass::Primary, [&[Step::Generate], &[]], stats)?;
                 r.resolve(Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
                 let shading =
@@ -306,11 +306,11 @@ impl Band<'_> {
                 if let Some(before) = &before {
                     half_rate::spread(engine.size.0 as usize, &output.pixels, before, &mut sum);
                 }
-                accumulation.add(&sum);
+                accumulation.add(sum);
                 !is_told || passes.watch.samples(finished, &accumulation)
             } else if is_told && checkpoints.contains(&finished) {
                 let mut so_far = accumulation.clone();
-                so_far.add(&engine.executor.read_radiance()?);
+                so_far.add(engine.executor.read_radiance()?);
                 passes.watch.samples(finished, &so_far)
             } else {
                 true
@@ -348,7 +348,7 @@ fn bounce(
             let shading = Shading { miss: true, environment: draws, ..Shading::default() };
             return r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats);
         }
-        r.trace(frame, pass, &plan.first(), stats)?;
+        r.trace(frame, pass, [&plan.first(), &[]], stats)?;
         r.note_answers(pass, false)?;
         r.resolve(pass, stats)?;
         let is_diffuse = matches!(pass, Pass::Diffuse(_));
@@ -433,12 +433,10 @@ fn trace_and_add(
         stats.add(engine.executor.run(pass, &steps, &engine.cache.states)?);
         return engine.note_answers(pass, true);
     }
-    engine.trace(frame, pass, &plan.first(), stats)?;
     let last = [&[Step::QueryHits], &plan.after[..], &[plan.add]].concat();
-    let report = engine.executor.run(pass, &last, &engine.cache.states)?;
+    let report = engine.trace(frame, pass, [&plan.first(), &last], stats)?;
     methods.learn(pass, &report);
-    stats.bricks_hit.extend(report.demand.iter().map(|d| d.brick));
-    stats.add(report);
+    stats.bricks_hit.extend(report.hit);
     engine.note_answers(pass, false)
 }
 

@@ -11,7 +11,7 @@ use super::kernels::Kernels;
 use super::lamps::LampBuffers;
 use super::pages::CachePages;
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
-use super::readback::{Readback, read};
+use super::readback::Readback;
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
@@ -50,7 +50,10 @@ pub struct GpuExecutor {
     /// Of families that nothing is made of: nothing.
     unheld: Option<Box<dyn Any>>,
     extent: Extent,
+    /// Of every submission.
     readback: Readback,
+    /// Of whole buffers.
+    whole: Readback,
     timing: Timing,
     view: Params,
     directions: Directions,
@@ -120,9 +123,10 @@ impl GpuExecutor {
             params: uniform(&gpu, "params", size_of::<Params>()),
             blocks: uniform(&gpu, "blocks", 4 * Own::WORDS),
         };
-        let read = [&buffers.counters, &buffers.demand, &buffers.texels.tile_demand];
-        let readback = Readback::new(&gpu, read.iter().map(|buffer| buffer.size()).sum());
         let timing = Timing::new(&gpu, MOST_DISPATCHES as u32);
+        let read = [&buffers.counters, &buffers.demand, &buffers.texels.tile_demand].into_iter().chain(timing.buffer());
+        let readback = Readback::new(&gpu, read.map(|buffer| buffer.size()).sum());
+        let whole = Readback::new(&gpu, 0);
         let groups = Groups::new(&gpu, &kernels, &buffers);
         let (view, directions) = (Params::default(), Directions::default());
         Ok(Self {
@@ -137,6 +141,7 @@ impl GpuExecutor {
             unheld: None,
             extent,
             readback,
+            whole,
             timing,
             view,
             directions,
@@ -156,10 +161,6 @@ impl GpuExecutor {
     /// The pipelines.
     pub fn kernels(&self) -> &Arc<Kernels> {
         &self.kernels
-    }
-
-    fn read_all<T: bytemuck::Pod>(&self, buffer: &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
-        Ok(bytemuck::pod_collect_to_vec(&read(&self.gpu, buffer)?))
     }
 
     /// What is made of a family.
@@ -293,11 +294,13 @@ impl GpuExecutor {
         self.timing.resolve(&mut encoder, dispatches.len() as u32);
         let mut read = vec![&self.buffers.counters, &self.buffers.demand];
         read.extend(samples.then_some(&self.buffers.texels.tile_demand));
+        read.extend(self.timing.buffer());
         self.readback.copy(&mut encoder, &read);
         self.gpu.queue.submit([encoder.finish()]);
         let bytes = self.readback.wait(&self.gpu)?;
         let (counters, rest) = bytes.split_at(layout::COUNTERS_AND_WORK * 4);
-        let (demand, tiles) = rest.split_at(self.buffers.demand.size() as usize);
+        let (demand, rest) = rest.split_at(self.buffers.demand.size() as usize);
+        let (tiles, times) = rest.split_at(if samples { self.buffers.texels.tile_demand.size() as usize } else { 0 });
         let counters: Vec<u32> = bytemuck::pod_collect_to_vec(counters);
         let demand: Vec<layout::Demand> =
             bytemuck::pod_collect_to_vec(&demand[..bricks.len() * size_of::<layout::Demand>()]);
@@ -308,16 +311,15 @@ impl GpuExecutor {
             report.tiles = textures::demand(&bytemuck::pod_collect_to_vec::<_, layout::TileDemand>(tiles));
         }
         if steps.iter().any(|step| matches!(step, Step::QueryPairs { .. })) && self.pair_count > 0 {
-            let rays: Vec<u32> = self.read_all(&self.buffers.tiles.pair_rays)?;
+            let rays: Vec<u32> = self.whole.read(&self.gpu, &self.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
         }
         if asks_for_stand_ins {
-            let states: Vec<u32> = self.read_all(&self.buffers.tiles.pair_rays)?;
+            let states: Vec<u32> = self.whole.read(&self.gpu, &self.buffers.tiles.pair_rays)?;
             report.states = states[..rays].to_vec();
         }
-        let times = self.timing.read(&self.gpu, dispatches.len())?;
         let mut ms_phases = [0.0; 3];
-        for (dispatch, ms) in dispatches.iter().zip(times) {
+        for (dispatch, ms) in dispatches.iter().zip(self.timing.ms(times)) {
             if let Some(phase) = dispatch.phase {
                 ms_phases[phase] += ms;
             }
@@ -457,9 +459,11 @@ impl FrameExecutor for GpuExecutor {
     }
 
     fn read(&mut self, family: &'static Family, buffer: usize, words: usize) -> Result<Vec<u32>, ExecutorError> {
-        let Some(own) = self.family(family) else { return Ok(Vec::new()) };
-        let bytes = read(&self.gpu, own.buffer(buffer))?;
-        Ok(bytemuck::pod_collect_to_vec(&bytes[..4 * words]))
+        let Self { gpu, whole, families, .. } = self;
+        let own = families.iter().find(|own| std::ptr::eq(own.family, family));
+        let mut all = own.map_or(Ok(Vec::new()), |own| whole.read(gpu, own.buffer(buffer)))?;
+        all.truncate(words);
+        Ok(all)
     }
 
     fn held(&mut self, family: &'static Family) -> &mut Option<Box<dyn Any>> {
@@ -490,23 +494,23 @@ impl FrameExecutor for GpuExecutor {
     }
 
     fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.read_all(&self.buffers.sets[pass.set()].rays)
+        self.whole.read(&self.gpu, &self.buffers.sets[pass.set()].rays)
     }
 
     fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.read_all(&self.buffers.sets[pass.set()].hits)
+        self.whole.read(&self.gpu, &self.buffers.sets[pass.set()].hits)
     }
 
     fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.read_all(&self.buffers.sets[pass.set()].surfaces)
+        self.whole.read(&self.gpu, &self.buffers.sets[pass.set()].surfaces)
     }
 
     fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read_all(&self.buffers.pixels.gbuffers[0])
+        self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[0])
     }
 
     fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.read_all(&self.buffers.pixels.radiance)
+        self.whole.read(&self.gpu, &self.buffers.pixels.radiance)
     }
 }
 

@@ -10,7 +10,7 @@ use super::device::Gpu;
 use super::groups::numbered;
 use super::kernels;
 use super::rays::storage;
-use super::readback::read;
+use super::readback::Readback;
 use super::wgsl::Pages;
 use crate::math::exact;
 use crate::schedule::ExecutorError;
@@ -163,7 +163,7 @@ pub fn dispatch<Case, const N: usize>(
         pass.dispatch_workgroups(cases.len().div_ceil(64) as u32, 1, 1);
     }
     gpu.queue.submit([encoder.finish()]);
-    Ok(bytemuck::pod_collect_to_vec(&read(gpu, &results)?))
+    Readback::new(gpu, 0).read(gpu, &results)
 }
 
 /// Neither denormal, infinite nor NaN: what the kernels' arithmetic is promised to see and give.

@@ -2,7 +2,11 @@
 
 use super::device::Gpu;
 use crate::schedule::ExecutorError;
+use bytemuck::Pod;
 use wgpu::BufferUsages;
+
+/// Most bytes of a whole buffer that are on their way at a time.
+const PIECE: u64 = 64 << 20;
 
 /// A reused host-visible buffer.
 pub struct Readback {
@@ -35,36 +39,49 @@ impl Readback {
     /// # Errors
     /// The device's.
     pub fn wait(&self, gpu: &Gpu) -> Result<Vec<u8>, ExecutorError> {
-        take(gpu, &self.buffer, self.used)
+        let mut taken = Vec::new();
+        self.take(gpu, self.used, |bytes| taken.extend_from_slice(bytes))?;
+        Ok(taken)
     }
-}
 
-/// Reads a whole buffer, in pieces of bounded size.
-///
-/// # Errors
-/// The device's.
-pub fn read(gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u8>, ExecutorError> {
-    const PIECE: u64 = 64 << 20;
-    let piece = mappable(gpu, source.size().min(PIECE));
-    let mut out = Vec::with_capacity(source.size() as usize);
-    let mut at = 0;
-    while at < source.size() {
-        let bytes = (source.size() - at).min(PIECE);
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(source, at, &piece, 0, bytes);
-        gpu.queue.submit([encoder.finish()]);
-        out.extend_from_slice(&take(gpu, &piece, bytes)?);
-        at += bytes;
+    /// Reads a whole buffer, in pieces of bounded size; makes room for them. Bytes behind the last whole `T` are left
+    /// out.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn read<T: Pod>(&mut self, gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
+        // Of whole elements, and of words, which copies are made of.
+        let piece = PIECE / (4 * size_of::<T>() as u64) * (4 * size_of::<T>() as u64);
+        if self.buffer.size() < source.size().min(piece) {
+            self.buffer = mappable(gpu, source.size().min(piece));
+        }
+        let mut all = Vec::with_capacity(source.size() as usize / size_of::<T>());
+        let mut at = 0;
+        while at < source.size() {
+            let bytes = (source.size() - at).min(piece);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(source, at, &self.buffer, 0, bytes);
+            gpu.queue.submit([encoder.finish()]);
+            self.take(gpu, bytes, |bytes| {
+                let whole = &bytes[..bytes.len() / size_of::<T>() * size_of::<T>()];
+                // Mapped memory is aligned as a rule.
+                match bytemuck::try_cast_slice(whole) {
+                    Ok(elements) => all.extend_from_slice(elements),
+                    Err(_) => all.extend(bytemuck::pod_collect_to_vec::<u8, T>(whole)),
+                }
+            })?;
+            at += bytes;
+        }
+        Ok(all)
     }
-    Ok(out)
-}
 
-/// Maps the first `bytes` of a readable buffer once the device is done, and copies them.
-pub fn take(gpu: &Gpu, buffer: &wgpu::Buffer, bytes: u64) -> Result<Vec<u8>, ExecutorError> {
-    map(gpu, buffer, wgpu::MapMode::Read)?;
-    let copy = buffer.get_mapped_range(..bytes).map_err(device_error)?.to_vec();
-    buffer.unmap();
-    Ok(copy)
+    /// Shows what the first `bytes` hold once the device is done.
+    fn take(&self, gpu: &Gpu, bytes: u64, show: impl FnOnce(&[u8])) -> Result<(), ExecutorError> {
+        map(gpu, &self.buffer, wgpu::MapMode::Read)?;
+        show(&self.buffer.get_mapped_range(..bytes).map_err(device_error)?);
+        self.buffer.unmap();
+        Ok(())
+    }
 }
 
 /// Maps a whole buffer, once the device is done with it.

@@ -1,13 +1,11 @@
 //! Device time of every dispatch, by timestamps where the device has them.
 
 use super::device::Gpu;
-use super::readback::take;
-use crate::schedule::ExecutorError;
 use wgpu::BufferUsages;
 
 /// Two timestamps a dispatch.
 pub struct Timing {
-    set: Option<(wgpu::QuerySet, wgpu::Buffer, wgpu::Buffer)>,
+    set: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     period_ns: f64,
 }
 
@@ -20,9 +18,8 @@ impl Timing {
                 ty: wgpu::QueryType::Timestamp,
                 count: 2 * dispatches,
             });
-            let buffer = |usage| gpu.buffer("timestamps", 16 * u64::from(dispatches), usage);
-            let resolved = buffer(BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC);
-            (set, resolved, buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST))
+            let usage = BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC;
+            (set, gpu.buffer("timestamps", 16 * u64::from(dispatches), usage))
         });
         Self { set, period_ns: f64::from(gpu.queue.get_timestamp_period()) }
     }
@@ -36,23 +33,21 @@ impl Timing {
         })
     }
 
-    /// Encodes the way of `dispatches` timestamp pairs to the host.
+    /// What timestamps are read back of; nothing without them.
+    pub fn buffer(&self) -> Option<&wgpu::Buffer> {
+        self.set.as_ref().map(|(_, resolved)| resolved)
+    }
+
+    /// Puts the timestamps of `dispatches` into [`Self::buffer`].
     pub fn resolve(&self, encoder: &mut wgpu::CommandEncoder, dispatches: u32) {
-        if let Some((set, resolved, mapped)) = self.set.as_ref().filter(|_| dispatches > 0) {
+        if let Some((set, resolved)) = self.set.as_ref().filter(|_| dispatches > 0) {
             encoder.resolve_query_set(set, 0..2 * dispatches, resolved, 0);
-            encoder.copy_buffer_to_buffer(resolved, 0, mapped, 0, 16 * u64::from(dispatches));
         }
     }
 
-    /// Milliseconds of each dispatch of the submission just waited for; zeros without timestamps.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn read(&self, gpu: &Gpu, dispatches: usize) -> Result<Vec<f64>, ExecutorError> {
-        let Some((_, _, mapped)) = self.set.as_ref().filter(|_| dispatches > 0) else {
-            return Ok(vec![0.0; dispatches]);
-        };
-        let stamps: Vec<u64> = bytemuck::pod_collect_to_vec(&take(gpu, mapped, 16 * dispatches as u64)?);
-        Ok(stamps.chunks_exact(2).map(|p| p[1].saturating_sub(p[0]) as f64 * self.period_ns * 1e-6).collect())
+    /// Milliseconds of each dispatch, from the bytes of [`Self::buffer`]; none where there are no timestamps.
+    pub fn ms(&self, bytes: &[u8]) -> Vec<f64> {
+        let stamps: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
+        stamps.chunks_exact(2).map(|p| p[1].saturating_sub(p[0]) as f64 * self.period_ns * 1e-6).collect()
     }
 }

@@ -29,14 +29,23 @@ pub fn slots(bricks: &BrickStates) -> Vec<layout::Slot> {
     (0..bricks.len()).map(slot).collect()
 }
 
-/// Moves the resident bricks that `steps` intersected from the report's demand to those used.
+/// Moves what `steps` say of bricks that nobody asks for out of the report's demand: the resident ones that were
+/// intersected, and those that hold hits.
 pub fn take_used(report: &mut Report, steps: &[Step], bricks: &BrickStates) {
+    let asks_hits = steps.contains(&Step::QueryHits);
+    if asks_hits {
+        // No other query runs beside it, and what intersections note has no distance.
+        report.hit = report.demand.iter().filter(|d| d.nearest == 0.0).map(|d| d.brick).collect();
+    }
     if steps.iter().any(|step| step.is_intersection()) {
         // Queries in the same submission ask for missing bricks, or for what is not done beside a batch, which is; of
         // the others rays have noted the use.
         let undone = steps.iter().any(|step| matches!(step, Step::Query(query) if query.undone));
         let is_used = |brick: usize| bricks.geometry(brick).is_some() && (!undone || bricks.done(brick));
         report.used = report.demand.extract_if(.., |d| is_used(d.brick as usize)).map(|d| d.brick).collect();
+    }
+    if asks_hits {
+        report.demand.clear();
     }
 }
 

@@ -22,8 +22,8 @@ pub fn resolve(
     // Steps that shade work on the hits of the set before.
     let next = if pass.set() == 0 { Pass::Shadow(Lamp::Sun) } else { Pass::BounceShadow(Lamp::Sun) };
     let report = executor.run(pass, &[Step::QueryHits], &cache.states)?;
-    let hit: Vec<u32> = report.demand.iter().map(|d| d.brick).collect();
-    stats.add(report);
+    stats.add(&report);
+    let hit = report.hit;
     let (resident, missing): (Vec<u32>, Vec<u32>) =
         hit.iter().partition(|&&brick| cache.states.attributes(brick as usize).is_some());
     for &brick in &resident {

@@ -23,7 +23,7 @@ pub fn trace(t: &mut Tracer, first: &[Step]) -> Result<(), ExecutorError> {
         (true, true) => steps.extend([Step::IntersectAllResident, query]),
         (true, false) => steps.push(query),
     }
-    let report = t.executor.run(t.pass, &steps, &t.cache.states)?;
+    let report = if some_missing { t.run(&steps)? } else { t.run_whole(&steps)? };
     if !some_missing || on.resident_first {
         t.cache.finish_resident(&report.used, some_missing, t.stats);
     }

@@ -13,7 +13,7 @@ pub fn trace(t: &mut Tracer, intersect: Step, first: &[Step]) -> Result<(), Exec
     let bricks = (0..states.len()).filter(|&brick| states.geometry(brick).is_none());
     let missing: Vec<Item> = bricks.map(|brick| Item::geometry(brick as u32)).collect();
     t.cache.load_all(t.executor, &missing, 64, t.stats)?;
-    let report = t.executor.run(t.pass, &[first, &[Step::CountRays, intersect]].concat(), &t.cache.states)?;
+    let report = t.run_whole(&[first, &[Step::CountRays, intersect]].concat())?;
     t.cache.finish_resident(&report.used, false, t.stats);
     t.stats.add(report);
     t.measure_needed(&resident_before)

@@ -44,6 +44,8 @@ pub struct Report {
     /// Resident bricks that a step of intersection entered: some ray met a child box of their root before its hit at
     /// that time. Ascending.
     pub used: Vec<u32>,
+    /// Bricks that hold a final hit, after [`Step::QueryHits`](super::Step::QueryHits). Ascending.
+    pub hit: Vec<u32>,
     /// Entries that the tiles' lists hold, or would hold.
     pub list_entries: u32,
     /// Most leaves that a tile selected to be intersected.

@@ -21,6 +21,11 @@ pub struct Tracer<'a> {
     pub tracing: &'a Tracing,
     /// What is counted.
     pub stats: &'a mut Counters,
+    /// Steps that follow once the hits are final. A schedule that knows its last submission beforehand appends them to
+    /// it; a pass of more takes a round trip more for them.
+    pub last: &'a [Step],
+    /// What these reported, where they have been run.
+    pub ended: Option<Report>,
 }
 
 impl Optimisations {
@@ -35,14 +40,25 @@ impl Optimisations {
     }
 }
 
-impl Tracer<'_> {
+impl<'a> Tracer<'a> {
+    /// Of a pass that nothing follows.
+    pub fn new(
+        executor: &'a mut dyn Executor,
+        cache: &'a mut Cache,
+        pass: Pass,
+        tracing: &'a Tracing,
+        stats: &'a mut Counters,
+    ) -> Self {
+        Self { executor, cache, pass, tracing, stats, last: &[], ended: None }
+    }
+
     /// Runs `steps`. Without [`Optimisations::by_tile`] each intersection of selected leaves becomes dispatches of one
     /// leaf a tile, and one round trip more, which says how many. What came back before the last submission is counted.
     ///
     /// # Errors
     /// What the executor says.
     pub fn run(&mut self, steps: &[Step]) -> Result<Report, ExecutorError> {
-        let Self { executor, cache, pass, tracing, stats } = self;
+        let Self { executor, cache, pass, tracing, stats, .. } = self;
         let mut run = |steps: &[Step]| executor.run(*pass, steps, &cache.states);
         if tracing.optimisations.by_tile {
             return run(steps);
@@ -76,6 +92,20 @@ impl Tracer<'_> {
         report.used.append(&mut used);
         report.used.sort_unstable();
         report.used.dedup();
+        Ok(report)
+    }
+
+    /// Runs the only submission of a pass: `steps`, and what follows the pass.
+    ///
+    /// # Errors
+    /// What the executor says.
+    pub fn run_whole(&mut self, steps: &[Step]) -> Result<Report, ExecutorError> {
+        // What is measured after a pass asks of hits as tracing left them.
+        let last = if self.tracing.measure_needed { &[] } else { self.last };
+        let report = self.executor.run(self.pass, &[steps, last].concat(), &self.cache.states)?;
+        if !last.is_empty() {
+            self.ended = Some(report.clone());
+        }
         Ok(report)
     }
 

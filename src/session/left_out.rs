@@ -2,7 +2,7 @@
 
 use super::opened::Opened;
 use super::renderer::lit_renderer;
-use crate::frame::{Light, Renderer};
+use crate::frame::{FrameWatch, Light, RenderError, Renderer};
 use crate::kernels::layout::{GBuffer, Hit, Ray, Surface};
 use crate::kernels::{Keep, opacity, reflectance};
 use crate::scene::Camera;
@@ -22,7 +22,13 @@ const REPETITIONS: usize = 5;
 const AOV_BYTES: u64 = 4 + 12 + 4 + 12;
 
 /// How a thing that is left out is kept.
-type Keeper = fn(&mut Keep);
+#[derive(Clone, Copy, Debug)]
+enum Keeper {
+    /// In kernels, and in what they work on.
+    Kernels(fn(&mut Keep)),
+    /// In a renderer that has been opened.
+    Renderer(fn(&mut Renderer)),
+}
 
 /// Something that rendering may need.
 #[derive(Clone, Debug)]
@@ -81,23 +87,23 @@ pub fn components(renderer: &mut Renderer, settings: &Settings) -> Vec<Component
     let mut list = Vec::new();
     let fits = ["the cache does not hold every brick and tile", "the cache holds every brick and tile"];
     list.push(Component {
-        keep: Some(|keep| keep.queries = true),
+        keep: Some(Keeper::Kernels(|keep| keep.queries = true)),
         ..of(cache < all, "queries for missing bricks", fits, How::Start, None)
     });
     let textures = ["materials have textures", "no material has a texture"];
     let texture_bytes = Some(renderer.executor.texture_bytes()).filter(|&bytes| bytes > 0);
     list.push(Component {
-        keep: Some(|keep| keep.textures = true),
+        keep: Some(Keeper::Kernels(|keep| keep.textures = true)),
         ..of(manifest.has_textures, "texture lookups", textures, by(can.textures), texture_bytes)
     });
     let alpha = ["rays pass through some triangles", "no ray passes through a triangle"];
     list.push(Component {
-        keep: Some(|keep| keep.opacity = true),
+        keep: Some(Keeper::Kernels(|keep| keep.opacity = true)),
         ..of(opacity::is_needed(resident), "alpha tests in traversal", alpha, by(can.opacity), None)
     });
     let gloss = ["some surfaces are not Lambertian", "every surface is Lambertian"];
     list.push(Component {
-        keep: Some(|keep| keep.gloss = true),
+        keep: Some(Keeper::Kernels(|keep| keep.gloss = true)),
         ..of(reflectance::is_needed(resident), "reflections other than diffuse ones", gloss, by(can.gloss), None)
     });
     let instances = ["instances place objects", "everything is baked into the world"];
@@ -113,9 +119,15 @@ pub fn components(renderer: &mut Renderer, settings: &Settings) -> Vec<Component
     list.push(of(renderer.draws_environment(), "rays to an environment", environment, How::Start, None));
     let bounces = ["--effects has diffuse or glossy", "--effects has neither diffuse nor glossy"];
     let of_rays = rays * (size_of::<Ray>() + size_of::<Hit>() + size_of::<Surface>() + size_of::<GBuffer>()) as u64;
-    list.push(of(effects.has_bounces(), "rays from hits of rays", bounces, How::Start, Some(of_rays)));
+    list.push(Component {
+        keep: Some(Keeper::Renderer(|renderer| renderer.executor.allow_bounces())),
+        ..of(effects.has_bounces(), "rays from hits of rays", bounces, How::Start, Some(of_rays))
+    });
     let aov = ["--aov asks for them", "--aov does not ask for them"];
-    list.push(of(settings.aov, "depth, normals, ids, albedo", aov, How::Start, Some(pixels * AOV_BYTES)));
+    list.push(Component {
+        keep: Some(Keeper::Renderer(|renderer| renderer.settings.aov = true)),
+        ..of(settings.aov, "depth, normals, ids, albedo", aov, How::Start, Some(pixels * AOV_BYTES))
+    });
     let denoiser = ["--denoise asks for it", "--denoise does not ask for it"];
     list.push(of(settings.denoise, "denoiser", denoiser, How::Start, None));
     let taa = ["--taa asks for it", "--taa does not ask for it"];
@@ -182,7 +194,7 @@ pub struct Measured {
 
 /// What a frame of `camera`, of the scene in the file `path`, takes as it is rendered, with each of `all` kept, and
 /// with all of them, turn by turn: medians of the milliseconds of five frames each, after one that is not counted.
-/// Nothing is stated of what kernels decide as they run.
+/// Nothing is stated of what kernels decide as they run, nor where `watch` says that it is to come to an end.
 ///
 /// # Errors
 /// The device's.
@@ -193,33 +205,53 @@ pub fn measure(
     settings: &Settings,
     light: &Light,
     camera: &Camera,
+    watch: &mut dyn FrameWatch,
 ) -> Result<Measured> {
     let settings = Settings { requests_out: None, ..settings.clone() };
-    let open = |keep: Keep| -> Result<Renderer> {
-        let opened = Opened::open_keeping(scene.clone(), path, &settings, keep)?;
-        Ok(lit_renderer(opened, &settings, light.clone()))
-    };
-    let mut renderers = vec![open(Keep::default())?];
-    let can = renderers[0].executor.leaves_out();
-    let keep = |one: &Component| {
+    let open = |keepers: &[Keeper]| -> Result<Renderer> {
         let mut keep = Keep::default();
-        one.keep.iter().for_each(|set| set(&mut keep));
-        keep
+        for keeper in keepers {
+            if let Keeper::Kernels(set) = keeper {
+                set(&mut keep);
+            }
+        }
+        let opened = Opened::open_keeping(scene.clone(), path, &settings, keep)?;
+        let mut renderer = lit_renderer(opened, &settings, light.clone());
+        for keeper in keepers {
+            if let Keeper::Renderer(set) = keeper {
+                set(&mut renderer);
+            }
+        }
+        Ok(renderer)
     };
-    let can_keep = |one: &Component| !one.is_in && one.keep.is_some() && keep(one).is_part_of(can);
-    let kept: Vec<usize> = (0..all.len()).filter(|&i| can_keep(&all[i])).collect();
-    let mut every = Keep::default();
-    for &i in &kept {
-        renderers.push(open(keep(&all[i]))?);
-        all[i].keep.iter().for_each(|set| set(&mut every));
+    let mut renderers = vec![open(&[])?];
+    let can = renderers[0].executor.leaves_out();
+    let can_keep = |keeper: &Keeper| match keeper {
+        Keeper::Kernels(set) => {
+            let mut keep = Keep::default();
+            set(&mut keep);
+            keep.is_part_of(can)
+        }
+        Keeper::Renderer(_) => true,
+    };
+    let keeper = |one: &Component| one.keep.filter(|keeper| !one.is_in && can_keep(keeper));
+    let kept: Vec<(usize, Keeper)> = (0..).zip(all).filter_map(|(i, one)| Some((i, keeper(one)?))).collect();
+    let every: Vec<Keeper> = kept.iter().map(|(_, keeper)| *keeper).collect();
+    for keepers in every.chunks(1).chain([&every[..]]) {
+        if !watch.passes(0, 1) {
+            return Ok(Measured::default());
+        }
+        renderers.push(open(keepers)?);
     }
-    renderers.push(open(every)?);
     let mut times = vec![Vec::new(); renderers.len()];
     let mut pictures = vec![Vec::new(); renderers.len()];
     for repetition in 0..=REPETITIONS {
         for ((renderer, times), picture) in renderers.iter_mut().zip(&mut times).zip(&mut pictures) {
             let start = Instant::now();
-            let output = renderer.frame(0, camera)?;
+            let output = match renderer.frame_watched(0, camera, &[], watch) {
+                Err(RenderError::Interrupted) => return Ok(Measured::default()),
+                output => output?,
+            };
             if repetition > 0 {
                 times.push(start.elapsed().as_secs_f64() * 1e3);
             }
@@ -241,8 +273,10 @@ pub fn measure(
         })
     };
     let mut each = vec![Map::new(); all.len()];
-    for (at, &i) in kept.iter().enumerate() {
+    for (at, &(i, _)) in kept.iter().enumerate() {
         each[i].extend(of(at + 1).as_object().cloned().into_iter().flatten());
     }
-    Ok(Measured { each, together: of(kept.len() + 1) })
+    let mut together = of(kept.len() + 1);
+    together["bytes_saved"] = kept.iter().filter_map(|&(i, _)| all[i].bytes).sum::<u64>().into();
+    Ok(Measured { each, together })
 }

@@ -350,15 +350,15 @@ impl Session {
     }
 
     /// What of all that rendering may need was there and what was left out, and why, as summaries list it; what that
-    /// saves is measured where settings ask for it.
+    /// saves is measured where settings ask for it and `watch` lets it go on.
     ///
     /// # Errors
     /// The device's.
-    pub fn left_out(&mut self) -> Result<LeftOut> {
+    pub fn left_out(&mut self, watch: &mut dyn FrameWatch) -> Result<LeftOut> {
         let all = left_out::components(&mut self.renderer, &self.settings);
         let camera = self.path.frame(0, self.settings.frames);
         let measured = match &self.first {
-            Some((scene, light)) => left_out::measure(&all, scene, &self.file, &self.settings, light, &camera)?,
+            Some((scene, light)) => left_out::measure(&all, scene, &self.file, &self.settings, light, &camera, watch)?,
             None => left_out::Measured::default(),
         };
         let left_out = left_out::listed(&all, false, &measured.each);

@@ -197,7 +197,8 @@ pub fn trace_device(
     executor.begin_frame(&View { frame: *frame, params: Params::default(), directions });
     executor.set_rays(pass, rays);
     cache.begin_pass("trace", 0);
-    let mut tracer = Tracer { executor: &mut *executor, cache, pass, tracing: &Tracing::default(), stats };
+    let tracing = &Tracing::default();
+    let mut tracer = Tracer::new(&mut *executor, cache, pass, tracing, stats);
     schedule::trace(&mut tracer, traced.schedule, &[Step::StartHits])?;
     let mut hits = executor.read_hits(pass)?;
     hits.truncate(rays.len());

@@ -11,15 +11,15 @@ impl GpuExecutor {
     /// Reads the tiles back: bounds, lists, entries, selection.
     pub fn read_tiles(&mut self) -> Result<TilesRead, ExecutorError> {
         Ok((
-            self.read_all(&self.buffers.tiles.bounds)?,
-            self.read_all(&self.buffers.tiles.lists)?,
-            self.read_all(&self.buffers.tiles.list)?,
-            self.read_all(&self.buffers.tiles.selection)?,
+            self.whole.read(&self.gpu, &self.buffers.tiles.bounds)?,
+            self.whole.read(&self.gpu, &self.buffers.tiles.lists)?,
+            self.whole.read(&self.gpu, &self.buffers.tiles.list)?,
+            self.whole.read(&self.gpu, &self.buffers.tiles.selection)?,
         ))
     }
 
     /// The G-buffer of the hits of a set.
     pub fn read_gbuffer_of(&mut self, set: usize) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.read_all(&self.buffers.pixels.gbuffers[set])
+        self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[set])
     }
 }

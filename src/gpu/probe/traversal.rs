@@ -105,7 +105,7 @@ fn trace(
             executor.set_rays(pass, rays);
             cache.begin_pass("probe", 0);
             let (tracing, stats) = (&Tracing::default(), &mut Counters::default());
-            let mut tracer = Tracer { executor: &mut executor, cache: &mut cache, pass, tracing, stats };
+            let mut tracer = Tracer::new(&mut executor, &mut cache, pass, tracing, stats);
             schedule::trace(&mut tracer, by, &[Step::StartHits])?;
             let (hits, mut surfaces) = (executor.read_hits(pass)?, executor.read_surfaces(pass)?);
             // What a ray still asks for is no part of its hit.

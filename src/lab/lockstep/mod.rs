@@ -179,6 +179,7 @@ impl Findings {
         };
         self.words("tiles", context, &tiles(gpu), &tiles(cpu));
         self.words("used bricks", context, &gpu.used, &cpu.used);
+        self.words("hit bricks", context, &gpu.hit, &cpu.hit);
         self.words("rays of pairs", context, &gpu.pair_rays, &cpu.pair_rays);
         self.words("states", context, &gpu.states, &cpu.states);
     }

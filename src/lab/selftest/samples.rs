@@ -70,7 +70,7 @@ pub fn accumulation(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let mut accumulation = Accumulation::default();
     for first in (0..frames).step_by(BATCH_SAMPLES as usize) {
         add_samples(&mut renderer, &camera, first, BATCH_SAMPLES)?;
-        accumulation.add(&renderer.executor.read_radiance()?);
+        accumulation.add(renderer.executor.read_radiance()?);
     }
     checks.at_most(&format!("{frames} accumulated frames: relative drift"), drift(&accumulation.mean()), BOUND);
 
@@ -78,7 +78,7 @@ pub fn accumulation(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     let few = frames.min(30_000) / STEPS * STEPS;
     add_samples(&mut renderer, &camera, 0, few)?;
     let mut one = Accumulation::default();
-    one.add(&renderer.executor.read_radiance()?);
+    one.add(renderer.executor.read_radiance()?);
     checks.at_least(&format!("{few} frames in one sum of f32: relative drift"), drift(&one.mean()), 2.0 * BOUND);
     Ok(())
 }

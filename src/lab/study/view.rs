@@ -3,7 +3,7 @@
 use super::args::{Effect, Scale};
 use super::plan::{Job, Way, base, rays};
 use crate::counters::Record;
-use crate::frame::{FrameWatch, Methods, RenderError, Renderer};
+use crate::frame::{FrameOutput, FrameWatch, Methods, RenderError, Renderer};
 use crate::lab::bench::scenes::empty_cache;
 use crate::lab::console::{Console, Stopped};
 use crate::metrics::Image;
@@ -16,7 +16,7 @@ use crate::session::Settings;
 use crate::session::lighting::lighting;
 use crate::session::opened::{Opened, scaled_threshold};
 use crate::session::renderer::{lit_renderer, methods, render_settings};
-use crate::settings::{Adapter, CacheSize, Schedule};
+use crate::settings::{Adapter, CacheSize, ImageSize, Schedule};
 use anyhow::{Context, Result, bail};
 use bricks::SceneFile;
 use std::collections::BTreeMap;
@@ -71,6 +71,8 @@ pub struct Party {
     /// Seconds that were spent before its first picture: on a field of visibility.
     pub making: f64,
     methods: Methods,
+    /// What its filters have seen before a warm picture; `None` before the first.
+    seen: Option<Resolve>,
 }
 
 /// A picture.
@@ -166,19 +168,19 @@ impl<'a> View<'a> {
             making = kept.map_or_else(|| start.elapsed().as_secs_f64(), |kept| kept.1);
             fields.made.insert(key, (file, making));
         }
-        Ok(Party { way: way.clone(), settings, making, methods: own })
+        Ok(Party { way: way.clone(), settings, making, methods: own, seen: None })
     }
 
     /// A picture by a way; `is_cold`: beginning with an empty cache, and without what it has made for other pictures.
     /// Where filters look back at frames, it is the last of some that a still camera sees by rays of their own, and the
-    /// time is that of the last; a cold one is the first.
+    /// time is that of the last; a cold one is the first. The frames before it are made once a party: all warm pictures
+    /// of a party are of as many samples and of one seed.
     ///
     /// # Errors
     /// A brick that cannot be read; the device's; pixels that are not finite; the run is to come to an end.
     pub fn picture(&mut self, party: &mut Party, samples: u32, seed: u64, is_cold: bool) -> Result<Picture> {
-        let console = self.place.console;
-        console.go_on()?;
-        let (number, camera, file, views) = (self.number, self.camera, self.place.file, self.place.scale.views);
+        self.place.console.go_on()?;
+        let (number, views) = (self.number, self.place.scale.views);
         let settings = Settings { spp: party.settings.spp * samples, seed, ..party.settings.clone() };
         let renderer = self.side(&settings)?;
         if is_cold {
@@ -190,31 +192,53 @@ impl<'a> View<'a> {
         let schedule = if settings.query_threshold > 0 { Schedule::Chc } else { settings.schedule };
         renderer.settings = render_settings(&settings, schedule);
         renderer.executor.tuning().threshold = scaled_threshold(settings.query_threshold, renderer.tile);
-        let mut resolve = Resolve::new(settings.denoise, settings.taa);
-        let looks_back = (settings.denoise || settings.taa) && !is_cold;
-        let before = if looks_back { BEFORE } else { 0 };
-        let (mut start, mut last) = (Instant::now(), None);
-        // Of all views, no two frames have the same number: it chooses the rays.
-        for number in (0..=before).rev().map(|back| number + back * views) {
-            std::mem::swap(&mut renderer.methods, &mut party.methods);
-            start = Instant::now();
-            let output = renderer.frame_watched(number, &camera, &[], &mut UntilStopped(console));
-            std::mem::swap(&mut renderer.methods, &mut party.methods);
-            if matches!(output, Err(RenderError::Interrupted)) {
-                return Err(Stopped.into());
+        let mut resolve = match &party.seen {
+            Some(seen) if !is_cold => seen.clone(),
+            _ => Resolve::new(settings.denoise, settings.taa),
+        };
+        if !is_cold && party.seen.is_none() {
+            let before = if settings.denoise || settings.taa { BEFORE } else { 0 };
+            // Of all views, no two frames have the same number: it chooses the rays.
+            for back in (1..=before).rev() {
+                self.frame(party, &mut resolve, &settings, number + back * views)?;
             }
-            let mut output = output.with_context(|| file.display().to_string())?;
-            resolve.frame(&mut output);
-            last = Some(output);
+            party.seen = Some(resolve.clone());
         }
+        let start = Instant::now();
+        let output = self.frame(party, &mut resolve, &settings, number)?;
         let seconds = start.elapsed().as_secs_f64();
-        let output = last.context("a picture has a frame")?;
         if output.records.iter().any(|record| record.non_finite > 0) {
-            bail!("{}: {:?}: pixels were not finite; this is a bug in brickwalk", file.display(), party.way);
+            bail!("{}: {:?}: pixels were not finite; this is a bug in brickwalk", self.file(), party.way);
         }
-        let (width, height) = (renderer.size.0 as usize, renderer.size.1 as usize);
-        let image = Image { width, height, rgb: output.pixels.radiance };
+        let ImageSize { width, height } = settings.size;
+        let image = Image { width: width as usize, height: height as usize, rgb: output.pixels.radiance };
         Ok(Picture { image, seconds, records: output.records })
+    }
+
+    /// A frame by a way, resolved.
+    fn frame(
+        &mut self,
+        party: &mut Party,
+        resolve: &mut Resolve,
+        settings: &Settings,
+        number: u32,
+    ) -> Result<FrameOutput> {
+        let (console, camera) = (self.place.console, self.camera);
+        let renderer = self.side(settings)?;
+        std::mem::swap(&mut renderer.methods, &mut party.methods);
+        let output = renderer.frame_watched(number, &camera, &[], &mut UntilStopped(console));
+        std::mem::swap(&mut renderer.methods, &mut party.methods);
+        if matches!(output, Err(RenderError::Interrupted)) {
+            return Err(Stopped.into());
+        }
+        let mut output = output.with_context(|| self.file())?;
+        resolve.frame(&mut output);
+        Ok(output)
+    }
+
+    /// The name of the scene file.
+    fn file(&self) -> String {
+        self.place.file.display().to_string()
     }
 }
 

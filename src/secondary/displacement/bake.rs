@@ -164,7 +164,7 @@ fn trace(
     cache.begin_pass("displacement", 0);
     let stats = &mut Counters::default();
     let tracing = &Tracing::default();
-    let mut tracer = Tracer { executor: &mut *executor, cache, pass: Pass::Primary, tracing, stats };
+    let mut tracer = Tracer::new(&mut *executor, cache, Pass::Primary, tracing, stats);
     listed::trace(&mut tracer, &[Step::StartHits], &lists, &bricks)?;
     let hits = executor.read_hits(Pass::Primary)?;
     let mut at = 0;

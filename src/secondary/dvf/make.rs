@@ -62,7 +62,7 @@ impl Engine {
             self.trace_block(Pass::Primary, &[Step::Generate], &mut Counters::default())?;
             let report = self.executor.run(Pass::Primary, &[Step::QueryHits], &self.cache.states)?;
             if let Some(bricks) = &mut region.bricks {
-                bricks.extend(report.demand.iter().map(|demand| demand.brick));
+                bricks.extend(report.hit);
             }
             let (rays, hits) = (self.executor.read_rays(Pass::Primary)?, self.executor.read_hits(Pass::Primary)?);
             for (ray, hit) in rays.iter().zip(&hits).filter(|(_, hit)| hit.id != NONE) {
@@ -212,7 +212,7 @@ impl Engine {
     fn trace_block(&mut self, pass: Pass, first: &[Step], stats: &mut Counters) -> Result<(), ExecutorError> {
         // Rays of points go everywhere: no tile of them agrees on what is near.
         let by = Some(self.settings.schedule).filter(|by| *by != Schedule::Chc).unwrap_or(Schedule::Demand);
-        schedule::trace(&mut self.tracer(pass, stats), by, first)
+        schedule::trace(&mut self.tracer(pass, &[], stats), by, first)
     }
 }
 

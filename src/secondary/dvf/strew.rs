@@ -340,7 +340,7 @@ impl<'a> Strewing<'a> {
             cache.touch_geometry(&report.used, may_wait, self.stats);
             return self.traced(block, report, tracing.measure_needed);
         }
-        schedule::trace(&mut self.renderer.tracer(PASS, self.stats), schedule, &[make])?;
+        schedule::trace(&mut self.renderer.tracer(PASS, &[], self.stats), schedule, &[make])?;
         let Engine { executor, cache, .. } = &mut *self.renderer;
         let report = executor.run(PASS, &[kernels::write(None, enters)], &cache.states)?;
         self.traced(block, report, false)
@@ -366,7 +366,7 @@ impl<'a> Strewing<'a> {
             state.strewn.trials.extend(ended.map(|(_, (ray, hit))| in_world(frame, ray, hit)));
         }
         if measure {
-            renderer.tracer(PASS, stats).measure_needed(&state.resident)?;
+            renderer.tracer(PASS, &[], stats).measure_needed(&state.resident)?;
         }
         state.answered += block.left - left;
         if left > 0 {

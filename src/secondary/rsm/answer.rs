@@ -206,5 +206,5 @@ fn lamp_view(engine: &Engine, lamp: &LampView, frame: Frame) -> View {
 /// Traces rays that were given, which have nothing in common with the frame before.
 fn trace_given(engine: &mut Engine, stats: &mut Counters) -> Result<(), ExecutorError> {
     let by = engine.settings.schedule;
-    schedule::trace(&mut engine.tracer(Pass::Primary, stats), by, &[Step::StartHits])
+    schedule::trace(&mut engine.tracer(Pass::Primary, &[], stats), by, &[Step::StartHits])
 }

@@ -46,8 +46,9 @@ struct Way {
     candidate: Option<&'static Candidate>,
     methods: Methods,
     making: f64,
-    /// Seconds by which its first frame took longer than one after it: kernels were compiled.
-    compiling: Option<f64>,
+    /// Seconds by which its very first frame took longer than its first one with kernels that are compiled, and that
+    /// one than those after it, which have what it has made.
+    starting: Option<[f64; 2]>,
     /// Seconds by size and view.
     seconds: [[Vec<f64>; VIEWS as usize]; 2],
     /// By size and view: nothing more is to be measured.
@@ -113,7 +114,7 @@ pub fn measure(file: &Path, settings: &Settings, progress: &mut Progress) -> Res
         }
         primary.append(&mut ways[0].primary);
         for way in &ways {
-            if let (Some(candidate), Some(seconds)) = (way.candidate, way.compiling) {
+            if let (Some(candidate), Some([seconds, _])) = (way.candidate, way.starting) {
                 let most = compiling.entry(candidate.method).or_insert(0.0f64);
                 *most = most.max(seconds);
             }
@@ -148,13 +149,23 @@ impl Place<'_> {
                     if way.needs_field() {
                         self.make_field(renderer, way)?;
                     }
-                    let is_new = way.compiling.is_none();
-                    let mut frame = || way.frame(renderer, view as u32, self.path, going);
-                    let first = if is_new { Some(frame()?.records) } else { None };
-                    let records = frame()?.records;
-                    let seconds = super::seconds_of(self.effect, &records);
-                    if let Some(first) = first {
-                        way.compiling = Some((super::seconds_of(self.effect, &first) - seconds).max(0.0));
+                    let mut first = None;
+                    if way.starting.is_none() {
+                        let very_first = self.seconds(renderer, way, view, going)?.0;
+                        let made_anew = match way.candidate {
+                            // Of a field it is known what it takes.
+                            Some(candidate) if candidate.method != Method::Dvf => {
+                                way.methods = Way::of(candidate, self.settings, renderer.scene.resident())?.methods;
+                                Some(self.seconds(renderer, way, view, going)?.0)
+                            }
+                            _ => None,
+                        };
+                        first = Some((very_first, made_anew));
+                    }
+                    let (seconds, records) = self.seconds(renderer, way, view, going)?;
+                    if let Some((very_first, made_anew)) = first {
+                        let made_anew = made_anew.unwrap_or(seconds);
+                        way.starting = Some([(very_first - made_anew).max(0.0), (made_anew - seconds).max(0.0)]);
                     }
                     if way.candidate.is_none() {
                         exact = seconds;
@@ -172,6 +183,18 @@ impl Place<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Renders a view by a way: seconds of the effect, and the frame's records.
+    fn seconds(
+        &self,
+        renderer: &mut Renderer,
+        way: &mut Way,
+        view: usize,
+        going: &mut Going,
+    ) -> Result<(f64, Vec<Record>)> {
+        let records = way.frame(renderer, view as u32, self.path, going)?.records;
+        Ok((super::seconds_of(self.effect, &records), records))
     }
 
     /// Makes the field of visibility of a way.
@@ -220,7 +243,7 @@ impl Way {
             candidate: None,
             methods: Methods::default(),
             making: 0.0,
-            compiling: None,
+            starting: None,
             seconds: Default::default(),
             is_told: Default::default(),
             rays: Default::default(),
@@ -283,7 +306,8 @@ fn note(rates: &mut Rates, effect: &str, ways: &[Way], compiling: &BTreeMap<Meth
         if seen.is_empty() || !percent.iter().chain(&flip_error).all(|error| error.is_finite()) {
             continue;
         }
-        let making = way.making + compiling.get(&candidate.method).copied().unwrap_or(0.0);
+        let own = way.starting.map_or(0.0, |[_, own]| own);
+        let making = way.making + own + compiling.get(&candidate.method).copied().unwrap_or(0.0);
         let (effect, name) = (effect.into(), candidate.name.into());
         rates.methods.push(MethodRate { effect, name, making, sample: sample.max(0.0), ray, percent, flip_error });
     }

@@ -23,7 +23,7 @@ use crate::secondary::dvf::prepare::{Walk, prepare};
 use crate::settings::ErrorLimit;
 use bricks::Resident;
 use candidates::{Candidate, possible};
-use model::{Counts, MARGIN, Offer, Offers, exact_seconds, offers};
+use model::{Counts, MARGIN, Means, Offer, Offers, exact_seconds, offers};
 use rates::{Found, RateFile, default_file};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -31,8 +31,6 @@ use std::path::{Path, PathBuf};
 
 /// Frames for which methods are chosen together.
 pub const BLOCK: u32 = 32;
-/// Share of what the frames of a block take exactly that measuring errors may take.
-const SHARE: f64 = 0.04;
 
 /// A frame of a walk.
 pub struct Wanted<'a> {
@@ -136,7 +134,7 @@ impl Auto {
             self.block = Some(first);
             self.take_nothing(renderer);
             let length = frames.saturating_sub(first).clamp(1, BLOCK);
-            if self.may_pay(renderer, length) {
+            if self.may_pay(renderer, length, frames) {
                 let captures = renderer.captures.replace(Captures::default());
                 let exact = match number == first {
                     true => renderer.frame_watched(first, camera, checkpoints, watch)?,
@@ -193,23 +191,35 @@ impl Auto {
         methods_of(&parts, renderer.scene.resident())
     }
 
-    /// Whether any method may pay, however many rays hit and whatever the cache holds; says why where none does.
-    fn may_pay(&mut self, renderer: &Renderer, length: u32) -> bool {
+    /// Whether any method may pay and be tried, however many rays hit and whatever the cache holds; says why where none
+    /// does.
+    fn may_pay(&mut self, renderer: &Renderer, length: u32, frames: u32) -> bool {
         let Self { settings, limit, rates, effects, .. } = self;
         let mut may = false;
         let pixels = f64::from(renderer.size.0) * f64::from(renderer.size.1);
+        let samples = renderer.settings.samples;
+        let missing = (renderer.cache.sizes.sum() as f64 - renderer.cache.residency.budget_bytes() as f64).max(0.0);
+        let most =
+            |effect: &str| Counts::most(pixels, rays_per_sample(effect, &renderer.settings.effects), samples, missing);
+        let means = rates.as_ref().map(|Found { rates, .. }| {
+            let exact = effects.iter().filter_map(|own| exact_seconds(rates, own.effect, &most(own.effect)));
+            Means::of(rates, *limit, pixels, samples)(exact.sum(), length, frames)
+        });
         for own in effects {
             let found = match &*rates {
                 _ if settings.motion.is_some() => Offers::none("instances move"),
                 _ if settings.lod > 0.0 => Offers::none("rates of levels of detail are not known"),
                 None => Offers::none("there are no rates of this device"),
                 Some(Found { rates, .. }) => {
-                    let rays = rays_per_sample(own.effect, &renderer.settings.effects);
-                    let most = Counts::most(pixels, rays, renderer.settings.samples);
-                    let loaded = offers(rates, own.effect, &most, &own.candidates, *limit, length);
-                    let held = Counts { missing: 0.0, ..most };
-                    let held = offers(rates, own.effect, &held, &own.candidates, *limit, length);
-                    if held.paying.is_empty() && loaded.paying.is_empty() { held } else { Offers::default() }
+                    let loaded = most(own.effect);
+                    let [held, mut loaded] = [Counts { missing: 0.0, ..loaded }, loaded]
+                        .map(|counts| offers(rates, own.effect, &counts, &own.candidates, *limit, length));
+                    loaded.paying.extend(&held.paying);
+                    let forbid = |offer: &Offer| means.as_ref().and_then(|means| means.forbid(offer));
+                    match loaded.paying.iter().map(forbid).collect::<Option<Vec<String>>>() {
+                        None => Offers::default(),
+                        Some(why) => why.into_iter().next().map_or(held, |why| Offers::none(&why)),
+                    }
                 }
             };
             may |= found.why.is_empty();
@@ -231,8 +241,7 @@ impl Auto {
         let pixels = f64::from(renderer.size.0) * f64::from(renderer.size.1);
         let bricks = renderer.scene.resident().bricks.len().max(1) as f64;
         let brick_bytes = renderer.cache.sizes.sum() as f64 / bricks;
-        let primary = rates.primary * pixels * f64::from(samples);
-        let mut exact = primary;
+        let mut exact = 0.0;
         let mut left: Vec<Vec<Offer>> = Vec::new();
         for own in &mut self.effects {
             let counts = Counts::of(own.effect, &pilot.exact.records, samples, brick_bytes);
@@ -241,16 +250,12 @@ impl Auto {
             own.why = found.why;
             left.push(found.paying.into_iter().rev().collect());
         }
-        let flip = if matches!(self.limit, ErrorLimit::Flip(_)) { rates.flip * pixels } else { 0.0 };
-        let mut budget = SHARE * f64::from(pilot.length) * exact;
-        let making = SHARE * f64::from(pilot.frames) * exact;
+        let means = Means::of(&rates, self.limit, pixels, samples)(exact, pilot.length, pilot.frames);
+        let mut budget = means.errors;
         loop {
             let open = |(own, left): (&Own, &Vec<Offer>)| left.last().copied().filter(|_| own.takes.is_none());
             let mut round: Vec<Option<Offer>> = self.effects.iter().zip(&left).map(open).collect();
-            let cost = |round: &[Option<Offer>]| {
-                let own = round.iter().flatten().map(|offer| offer.seconds + flip).sum::<f64>();
-                primary + own
-            };
+            let cost = |round: &[Option<Offer>]| means.measuring(round.iter().flatten());
             while round.iter().any(Option::is_some) && cost(&round) > budget {
                 // The dearest of them is not measured.
                 let seconds = |i: &usize| round[*i].map_or(-1.0, |offer| offer.seconds);
@@ -261,7 +266,7 @@ impl Auto {
                 round[dearest] = None;
             }
             for (i, offer) in round.iter_mut().enumerate() {
-                if let Some(one) = offer.filter(|one| one.making > making) {
+                if let Some(one) = offer.filter(|one| one.making > means.making) {
                     self.effects[i].why = format!("there are too few frames to make {}", one.candidate.name);
                     left[i].pop();
                     *offer = None;

@@ -7,6 +7,9 @@ use crate::settings::ErrorLimit;
 
 /// A method is taken where it is expected to take less than this share of what exact rays do.
 const PAYS: f64 = 0.9;
+/// Share of what the frames of a block take exactly that measuring errors may take, and of what all frames of a walk
+/// take that making what turns out to err may take.
+const SHARE: f64 = 0.04;
 /// Errors of a frame must be below this share of what is allowed, as those of the frames after it may be larger.
 pub const MARGIN: f64 = 0.75;
 
@@ -36,9 +39,9 @@ impl Counts {
         Self { rays: rays as f64, samples: samples.into(), missing: (needed - cache).max(0.0) }
     }
 
-    /// The most that a picture can have: every camera ray hits.
-    pub fn most(pixels: f64, rays: u32, samples: u32) -> Self {
-        Self { rays: pixels * f64::from(rays) * f64::from(samples), samples: samples.into(), missing: f64::INFINITY }
+    /// The most that a picture can have: every camera ray hits, and all bytes that the cache cannot hold are `missing`.
+    pub fn most(pixels: f64, rays: u32, samples: u32, missing: f64) -> Self {
+        Self { rays: pixels * f64::from(rays) * f64::from(samples), samples: samples.into(), missing }
     }
 }
 
@@ -74,6 +77,45 @@ pub struct Offers {
     pub paying: Vec<Offer>,
     /// Why there are none.
     pub why: String,
+}
+
+/// What frames take exactly, and how much of that may be spent on what comes to nothing, should a method err too much.
+#[derive(Clone, Copy, Debug)]
+pub struct Means {
+    /// Seconds of the camera rays of a frame, with which errors are measured.
+    pub primary: f64,
+    /// Seconds that FLIP of a frame takes, where that is the measure.
+    pub flip: f64,
+    /// Seconds that may go to errors.
+    pub errors: f64,
+    /// Seconds that may go to what comes before the first frame of a method.
+    pub making: f64,
+}
+
+impl Means {
+    /// Of a block of `length` frames in a walk of `frames`, of which one takes `exact` seconds.
+    pub fn of(rates: &Rates, limit: ErrorLimit, pixels: f64, samples: u32) -> impl Fn(f64, u32, u32) -> Self {
+        let primary = rates.primary * pixels * f64::from(samples);
+        let flip = if matches!(limit, ErrorLimit::Flip(_)) { rates.flip * pixels } else { 0.0 };
+        move |exact, length, frames| {
+            let share = SHARE * (primary + exact);
+            Self { primary, flip, errors: share * f64::from(length), making: share * f64::from(frames) }
+        }
+    }
+
+    /// Seconds in which the errors of methods are measured together.
+    pub fn measuring<'a>(&self, offers: impl IntoIterator<Item = &'a Offer>) -> f64 {
+        self.primary + offers.into_iter().map(|offer| offer.seconds + self.flip).sum::<f64>()
+    }
+
+    /// Why a method cannot be tried; nothing where it can.
+    pub fn forbid(&self, offer: &Offer) -> Option<String> {
+        let (name, few) = (offer.candidate.name, "there are too few frames to");
+        if self.measuring([offer]) > self.errors {
+            return Some(format!("{few} measure the error of {name}"));
+        }
+        (offer.making > self.making).then(|| format!("{few} make {name}"))
+    }
 }
 
 /// What pays for the rays of an effect over `frames` frames.
@@ -175,8 +217,23 @@ mod tests {
         let all = offers(&rates, "ao", &counts, &of_ao(), ErrorLimit::Percent(5.0), 32);
         // 1 s of rays and 2 s of loads; maps load nothing.
         assert!((all.paying[0].share - 0.7 / 3.0).abs() < 1e-9, "{all:?}");
-        let most = offers(&rates, "ao", &Counts::most(1.0, 1, 1), &of_ao(), ErrorLimit::Percent(5.0), 32);
+        let most =
+            offers(&rates, "ao", &Counts::most(1.0, 1, 1, f64::INFINITY), &of_ao(), ErrorLimit::Percent(5.0), 32);
         assert_eq!(most.paying.len(), 2);
+    }
+
+    #[test]
+    fn what_takes_more_than_its_share_is_not_tried() {
+        let rates = rates(0.1, 0.4e-6);
+        let best = of(&rates, 1e6, ErrorLimit::Percent(5.0)).paying[0];
+        // A frame takes 1 s exactly, of which no camera rays; to measure the error takes 0.3 s.
+        let means = Means::of(&rates, ErrorLimit::Percent(5.0), 1e6, 1);
+        let why = |making, length, frames| means(1.0, length, frames).forbid(&Offer { making, ..best });
+        assert_eq!(why(0.0, 8, 8), None);
+        assert!(why(0.0, 7, 7).is_some_and(|why| why.contains("measure the error of roma, 64 cells")));
+        assert_eq!(why(1.2, 32, 32), None);
+        assert!(why(1.3, 32, 32).is_some_and(|why| why.contains("make roma, 64 cells")));
+        assert_eq!(why(1.3, 32, 64), None);
     }
 
     #[test]

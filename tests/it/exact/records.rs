@@ -254,7 +254,7 @@ fn records_are_what_a_spy_counts() {
                 let inner = &mut *renderer.engine.executor;
                 let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
                 let (tracing, pass) = (&tracing, Pass::Primary);
-                let mut tracer = Tracer { executor: &mut spy, cache: &mut *cache, pass, tracing, stats: &mut stats };
+                let mut tracer = Tracer::new(&mut spy, &mut *cache, pass, tracing, &mut stats);
                 schedule::trace(&mut tracer, schedule, &[Step::Generate]).expect("a pass");
                 attributes::resolve(&mut spy, cache, Pass::Primary, &mut stats).expect("attributes");
                 stats.ms = start.elapsed().as_secs_f64() * 1e3;
@@ -325,7 +325,7 @@ fn closest_hits_load_what_is_needed_and_nothing_else() {
             let mut spy = Spy { inner, batches: Vec::new(), submissions: Vec::new(), ms_loading: 0.0 };
             let cache = &mut renderer.engine.cache;
             let (tracing, pass) = (&tracing, Pass::Primary);
-            let mut tracer = Tracer { executor: &mut spy, cache, pass, tracing, stats: &mut stats };
+            let mut tracer = Tracer::new(&mut spy, cache, pass, tracing, &mut stats);
             schedule::trace(&mut tracer, schedule, &[Step::Generate]).expect("a pass");
             let needed: BTreeSet<u32> = stats.bricks_needed.distinct().into_iter().collect();
             let loaded = spy.batches.iter().flatten().map(|load| load.item.number);
