@@ -61,6 +61,7 @@ const PARAM_SKY: u32 = 8u;        // shade: with the sky's light, unshadowed
 const PARAM_BOUNCE: u32 = 16u;    // the hits that are shaded are those of set 1
 const PARAM_EMITTER: u32 = 32u;   // the pass's lamp is one of the emitters
 const PARAM_ENVIRONMENT: u32 = 64u; // the pass's lamp is the environment
+const PARAM_PATH: u32 = 32768u;  // the paths of the hits that are shaded go on: rays of theirs may meet the lamps
 const PARAM_SCATTER: u32 = 4096u;    // every pixel has a direction of its own around the normal
 const PARAM_TIGHTER: u32 = 128u;  // pairs are queried by the boxes of the node's children
 const PARAM_NEXT: u32 = 256u;     // a ray asks up to the first brick that it enters of those it asks for, not for all

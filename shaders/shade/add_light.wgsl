@@ -1,5 +1,6 @@
 // Adds the light of the pass's lamp to the hits of the shaded set whose shadow ray went free. The environment shares a
-// direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their gloss.
+// direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their gloss, and all light with
+// rays by which paths go on.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
@@ -7,6 +8,7 @@
 #include "shade/lamps.wgsl"
 #include "shade/light.wgsl"
 #include "shade/gloss.wgsl"
+#include "shade/paths.wgsl"
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -56,6 +58,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             weight = outweighs(density, density_of(s, unit_d));
         }
         reflects += weight * reflected(s, unit_d);
+    }
+    if (params.flags & PARAM_PATH) != 0u && density > 0.0 {
+        reflects *= outweighs(density, path_density(s, g.normal, normalize(d)));
     }
     add_light(index, weight_of(index) * reflects * light);
 }

@@ -11,7 +11,7 @@ use crate::kernels::query::stand_ins;
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
-use crate::kernels::table::{self, Family, Target};
+use crate::kernels::table::{self, Family, Target, names};
 use crate::kernels::texture::texels::{Sampling, Texels, TileDemand};
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::intersect_binary::BinaryTrees;
@@ -268,6 +268,10 @@ impl Executor for CpuExecutor {
                 };
                 let binary = self.binary.as_ref();
                 run_kernel(&dispatch, pass, &bound, &mut self.buffers, &attributes, (sampling, &tile_demand), binary)?;
+                if dispatch.kernel == names::generate_path {
+                    // What it has made belongs to the set before.
+                    self.buffers.sets.swap(1, 2);
+                }
                 if let Some(phase) = dispatch.phase {
                     ms_phases[phase] += start.elapsed().as_secs_f64() * 1e3;
                 }

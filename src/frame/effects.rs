@@ -10,12 +10,15 @@ pub struct Effects {
     pub environment: bool,
     /// Ambient occlusion, of the sky's light.
     pub occlusion: Option<Occlusion>,
-    /// Diffuse interreflection, one bounce: rays of each pixel and sample, as long as the scene. Their hits show their
+    /// Diffuse interreflection: rays of each pixel and sample, as long as the scene. Their hits show their
     /// emission and what they reflect of the lamps; the sky's light comes from those that miss.
     pub diffuse: Option<u32>,
     /// What surfaces reflect otherwise than diffusely, by their materials, of all that is around: one ray, drawn by the
     /// gloss of the surface, at primary hits. Without it they reflect the lamps alone, and the sky's light unshadowed.
     pub glossy: bool,
+    /// Bounces, 1 to 64: from the hits of diffuse and glossy rays paths go on, a ray from each hit, until so many rays
+    /// have been reflected, and each hit is lit as the first is.
+    pub bounces: u32,
     /// Greatest random turn of the directions of occlusion and diffuse rays about the normal, degrees from 0 to 360;
     /// each pixel has one of its own (CHC+RT §5.3). Small turns keep neighbouring rays alike.
     pub turn_degrees: f32,
@@ -31,6 +34,9 @@ pub struct Occlusion {
 }
 
 impl Effects {
+    /// Most bounces.
+    pub const MOST_BOUNCES: u32 = 64;
+
     /// Whether hits of rays that start at primary hits are shaded.
     pub fn has_bounces(&self) -> bool {
         self.diffuse.is_some() || self.glossy

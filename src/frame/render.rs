@@ -5,8 +5,8 @@ use super::correct::correct;
 use super::engine::RenderSettings;
 use super::half_rate;
 use super::{
-    Accumulation, BATCH_SAMPLES, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState, Pixels,
-    camera_view,
+    Accumulation, BATCH_SAMPLES, Effects, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState,
+    Pixels, camera_view,
 };
 use crate::counters::{Counters, Record};
 use crate::kernels::Lod;
@@ -15,6 +15,7 @@ use crate::math::sampling::pixel_jitter;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass, Shading, Step};
 use std::ops::{Deref, DerefMut};
+use std::sync::LazyLock;
 use thiserror::Error;
 
 /// Why a frame could not be rendered.
@@ -278,11 +279,11 @@ impl Band<'_> {
             }
             for index in directions(effects.diffuse.unwrap_or(0)) {
                 let names = ["diffuse", "diffuse-shadow", "diffuse-environment"];
-                bounce(engine, methods, records, names, Pass::Diffuse(index))?;
+                bounces(engine, methods, records, names, Pass::Diffuse(index))?;
                 passes.advance()?;
             }
             if effects.glossy {
-                bounce(engine, methods, records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
+                bounces(engine, methods, records, ["glossy", "glossy-shadow", "glossy-environment"], Pass::Glossy)?;
                 passes.advance()?;
             }
             if sample == 0 && engine.settings.coverage {
@@ -325,16 +326,62 @@ impl Band<'_> {
     }
 }
 
-/// Traces rays from primary hits whose own hits are shaded, and lights those: `names` are the effects that it counts
-/// for, as in [`light`] and [`light_environment`].
-fn bounce(
+/// What the rays of bounces from the second on count for, those to lamps, and those to the environment.
+static PATHS: LazyLock<Vec<[&'static str; 3]>> = LazyLock::new(|| {
+    let name = |number: u32, of: &str| &*format!("bounce-{number}{of}").leak();
+    (2..=Effects::MOST_BOUNCES).map(|number| ["", "-shadow", "-environment"].map(|of| name(number, of))).collect()
+});
+
+/// Traces rays from primary hits, and as many bounces from theirs as are asked for: `names` are the effects that the
+/// first counts for, as in [`light`] and [`light_environment`].
+fn bounces(
     engine: &mut Engine,
     methods: &mut Methods,
     records: &mut FrameRecords,
     names: [&'static str; 3],
     pass: Pass,
 ) -> Result<(), ExecutorError> {
+    let (frame, count) = (records.frame(), engine.settings.effects.bounces);
+    let to_lamps = |number: u32| if number < count { Pass::PathShadow } else { Pass::BounceShadow };
+    if !bounce(engine, methods, records, names, pass, to_lamps(1))? {
+        return Ok(());
+    }
+    for (number, names) in (2..=count).zip(&*PATHS) {
+        let of_lamp = to_lamps(number);
+        let mut rays = 0;
+        records.pass(engine, names[0], |r, stats| {
+            stats.add(r.executor.run(Pass::PathShadow(Lamp::Sun), &[Step::Continue(number)], &r.cache.states)?);
+            let before = stats.rays_traced;
+            r.trace(frame, Pass::Path(number), [&[], &[]], stats)?;
+            rays = stats.rays_traced - before;
+            r.resolve(Pass::Path(number), stats)?;
+            let (shadow, environment) = (r.settings.effects.shadow, r.draws_environment());
+            // What lamps bring to the hits before is weighted where these rays meet it.
+            let shading = Shading { sun: !shadow, sky: false, emission: true, miss: true, environment, gloss: true };
+            r.shade(of_lamp(Lamp::Sun), shading, stats)
+        })?;
+        if rays == 0 {
+            // All paths have ended.
+            break;
+        }
+        light(engine, methods, records, [names[0], names[1]], of_lamp)?;
+        light_environment(engine, methods, records, names[2], of_lamp)?;
+    }
+    Ok(())
+}
+
+/// Traces rays from primary hits whose own hits are shaded, and lights those by passes of `of_lamp`; whether rays were
+/// traced, so that paths may go on.
+fn bounce(
+    engine: &mut Engine,
+    methods: &mut Methods,
+    records: &mut FrameRecords,
+    names: [&'static str; 3],
+    pass: Pass,
+    of_lamp: fn(Lamp) -> Pass,
+) -> Result<bool, ExecutorError> {
     let (frame, effects) = (records.frame(), engine.settings.effects);
+    let goes_on = of_lamp(Lamp::Sun) == Pass::PathShadow(Lamp::Sun);
     let mut lit = None;
     records.pass(engine, names[0], |r, stats| {
         let plan = methods.plan(r, pass)?;
@@ -346,7 +393,7 @@ fn bounce(
             lit = Some(plan.light);
             // What is met shows nothing by itself.
             let shading = Shading { miss: true, environment: draws, ..Shading::default() };
-            return r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats);
+            return r.shade(of_lamp(Lamp::Sun), shading, stats);
         }
         r.trace(frame, pass, [&plan.first(), &[]], stats)?;
         r.note_answers(pass, false)?;
@@ -355,24 +402,24 @@ fn bounce(
         // What rays to lamps bring to the surface itself must not come by diffuse rays as well, or be weighted.
         let shading = Shading {
             sun: !effects.shadow,
-            sky: !is_diffuse && !draws,
+            sky: !is_diffuse && !draws && !goes_on,
             emission: !is_diffuse || !r.light.lamps.has_surfaces(),
             miss: true,
             environment: draws,
             gloss: pass == Pass::Glossy,
         };
-        r.shade(Pass::BounceShadow(Lamp::Sun), shading, stats)
+        r.shade(of_lamp(Lamp::Sun), shading, stats)
     })?;
-    match lit {
-        Some(steps) => records.pass(engine, names[1], |r, stats| {
-            stats.add(r.executor.run(Pass::BounceShadow(Lamp::Sun), &steps, &r.cache.states)?);
+    if let Some(steps) = lit {
+        records.pass(engine, names[1], |r, stats| {
+            stats.add(r.executor.run(of_lamp(Lamp::Sun), &steps, &r.cache.states)?);
             Ok(())
-        }),
-        None => {
-            light(engine, methods, records, [names[0], names[1]], Pass::BounceShadow)?;
-            light_environment(engine, methods, records, names[2], Pass::BounceShadow)
-        }
+        })?;
+        return Ok(false);
     }
+    light(engine, methods, records, [names[0], names[1]], of_lamp)?;
+    light_environment(engine, methods, records, names[2], of_lamp)?;
+    Ok(true)
 }
 
 /// Lights the hits that the passes `of_lamp` start from by sun and emitters, with shadows if they are on. The sun

@@ -290,6 +290,14 @@ impl GpuExecutor {
                     compute.dispatch_workgroups_indirect(&self.buffers.indirect, 0);
                 }
             }
+            drop(compute);
+            if dispatch.kernel == names::generate_path {
+                // What it has made belongs to the set before.
+                let [_, seen, own] = &self.buffers.sets;
+                for (own, seen) in own.buffers().into_iter().zip(seen.buffers()) {
+                    encoder.copy_buffer_to_buffer(own, 0, seen, 0, own.size().min(seen.size()));
+                }
+            }
         }
         self.timing.resolve(&mut encoder, dispatches.len() as u32);
         let mut read = vec![&self.buffers.counters, &self.buffers.demand];

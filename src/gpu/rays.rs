@@ -72,6 +72,11 @@ impl RayBuffers {
             surfaces: storage(gpu, "surfaces", rays, size_of::<layout::Surface>()),
         }
     }
+
+    /// All of them.
+    pub fn buffers(&self) -> [&wgpu::Buffer; 3] {
+        [&self.rays, &self.hits, &self.surfaces]
+    }
 }
 
 impl TileBuffers {

@@ -192,6 +192,9 @@ fn reflected_ambient(s: Gloss) -> vec3<f32> {
 fn reflected_by_diffuse_rays(s: Gloss) -> vec3<f32> {
     return s.diffuse;
 }
+fn reflected_around(s: Gloss) -> vec3<f32> {
+    return vec3<f32>(0.0);
+}
 fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
     return vec3<f32>(0.0);
 }

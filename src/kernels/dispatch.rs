@@ -19,16 +19,16 @@ impl Directions {
         let (stream, direction) = match pass {
             Pass::Primary | Pass::Shadow(Lamp::Sun) => (0, None),
             Pass::Shadow(Lamp::Emitter) => (1, None),
-            Pass::BounceShadow(Lamp::Sun) => (2, None),
-            Pass::BounceShadow(Lamp::Emitter) => (3, None),
+            Pass::BounceShadow(Lamp::Sun) | Pass::PathShadow(Lamp::Sun) => (2, None),
+            Pass::BounceShadow(Lamp::Emitter) | Pass::PathShadow(Lamp::Emitter) => (3, None),
             Pass::Shadow(Lamp::Environment) => (6, None),
-            Pass::BounceShadow(Lamp::Environment) => (7, None),
+            Pass::BounceShadow(Lamp::Environment) | Pass::PathShadow(Lamp::Environment) => (7, None),
             Pass::Occlusion(index) => (4, Some((index, self.occlusion))),
             Pass::Diffuse(index) => (5, Some((index, self.diffuse))),
-            Pass::Glossy => (8, None),
+            Pass::Glossy | Pass::Path(_) => (8, None),
         };
         let lamp = match pass {
-            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) => Some(lamp),
+            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => Some(lamp),
             _ => None,
         };
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
@@ -38,6 +38,7 @@ impl Directions {
                 | flag(lamp == Some(Lamp::Emitter), layout::PARAM_EMITTER)
                 | flag(lamp == Some(Lamp::Environment), layout::PARAM_ENVIRONMENT)
                 | flag(pass.set() == 2, layout::PARAM_BOUNCE)
+                | flag(matches!(pass, Pass::PathShadow(_)), layout::PARAM_PATH)
                 | flag(self.glossy, layout::PARAM_GLOSSY),
             stream: params.sample.wrapping_add(stream << 24),
             length: self.occlusion_length,
@@ -100,6 +101,9 @@ pub fn are_pairs_culled(step: Step, before: bool, threshold: u32) -> bool {
     }
 }
 
+/// The random numbers of the first ray of paths; those of passes lie below.
+const FIRST_STREAM_OF_PATHS: u32 = 16;
+
 /// Most workgroups of a dispatch in one dimension.
 const MOST_GROUPS: u32 = 65_535;
 
@@ -155,9 +159,14 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
                 Pass::Occlusion(_) => kernels::generate_occlusion,
                 Pass::Diffuse(_) => kernels::generate_diffuse,
                 Pass::Glossy => kernels::generate_glossy,
-                Pass::Primary | Pass::Shadow(_) | Pass::BounceShadow(_) => kernels::generate_shadow,
+                // Paths go on by a step of their own.
+                _ => kernels::generate_shadow,
             };
             vec![shading(kernel, params)]
+        }
+        Step::Continue(number) => {
+            let stream = params.sample.wrapping_add(FIRST_STREAM_OF_PATHS.wrapping_add(number) << 24);
+            vec![shading(kernels::generate_path, Params { stream, direction: number, ..params })]
         }
         Step::StartHits => vec![kernel(kernels::start_hits, params, per_ray, None)],
         Step::ClipRays => vec![kernel(kernels::clip_rays, params, per_ray, None)],

@@ -136,9 +136,13 @@ impl Lod {
             return [0.0; 4];
         }
         let spread = match pass {
-            Pass::Primary | Pass::Glossy | Pass::Shadow(Lamp::Emitter) | Pass::BounceShadow(Lamp::Emitter) => angle,
-            Pass::Shadow(Lamp::Sun) | Pass::BounceShadow(Lamp::Sun) => angle.max(2.0 * sun_radius),
-            Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment) => AROUND,
+            // Rays of gloss, and those of paths, each spread by what they were drawn by.
+            Pass::Primary | Pass::Glossy | Pass::Path(_) => angle,
+            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => match lamp {
+                Lamp::Emitter => angle,
+                Lamp::Sun => angle.max(2.0 * sun_radius),
+                Lamp::Environment => AROUND,
+            },
             Pass::Occlusion(_) | Pass::Diffuse(_) => AROUND,
         };
         let square = |angle: f32| (pixels * angle) * (pixels * angle);

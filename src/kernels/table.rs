@@ -20,6 +20,7 @@ use super::shade::generate::{
     generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
 use super::shade::halve_rays::halve_rays;
+use super::shade::paths::generate_path;
 use super::shade::resolve::resolve;
 use super::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
 use super::texture::sample::sample;
@@ -207,6 +208,8 @@ kernels! {
         |b, t| generate_diffuse(b, t.own, t.seen, t.pixels, t.materials);
     generate_glossy: "shade/generate_glossy" Shading []
         |b, t| generate_glossy(b, t.own, t.seen, t.pixels, t.materials);
+    generate_path: "shade/generate_path" Shading []
+        |b, t| generate_path(b, t.own, t.seen, t.pixels, t.materials);
     start_hits: "shade/start_hits" Tiles [] |_, t| start_hits(t.own);
     clip_rays: "shade/clip_rays" Tiles [] |b, t| clip_rays(b, t.own);
     halve_rays: "shade/halve_rays" Tiles [] |b, t| halve_rays(b, t.own);

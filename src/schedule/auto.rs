@@ -93,7 +93,8 @@ fn kind(pass: Pass) -> u32 {
         Pass::Occlusion(_) => 2,
         Pass::Diffuse(_) => 3,
         Pass::Glossy => 4,
-        Pass::BounceShadow(_) => 5,
+        Pass::BounceShadow(_) | Pass::PathShadow(_) => 5,
+        Pass::Path(_) => 6,
     }
 }
 

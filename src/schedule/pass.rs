@@ -26,8 +26,12 @@ pub enum Pass {
     Diffuse(u32),
     /// Rays from primary hits in a direction drawn by their gloss: closest hit.
     Glossy,
+    /// Rays by which paths go on from the hits of set 1, the ray of this number of each, from 2: closest hit.
+    Path(u32),
     /// Rays from the hits of set 1 to a lamp: any hit.
     BounceShadow(Lamp),
+    /// The same where paths go on from these hits.
+    PathShadow(Lamp),
 }
 
 impl Pass {
@@ -35,23 +39,26 @@ impl Pass {
     pub fn set(self) -> usize {
         match self {
             Pass::Primary => 0,
-            Pass::Shadow(_) | Pass::Occlusion(_) | Pass::Diffuse(_) | Pass::Glossy => 1,
-            Pass::BounceShadow(_) => 2,
+            Pass::Shadow(_) | Pass::Occlusion(_) | Pass::Diffuse(_) | Pass::Glossy | Pass::Path(_) => 1,
+            Pass::BounceShadow(_) | Pass::PathShadow(_) => 2,
         }
     }
 
     /// Whether any hit ends a ray.
     pub fn is_any_hit(self) -> bool {
-        matches!(self, Pass::Shadow(_) | Pass::Occlusion(_) | Pass::BounceShadow(_))
+        matches!(self, Pass::Shadow(_) | Pass::Occlusion(_) | Pass::BounceShadow(_) | Pass::PathShadow(_))
     }
 
     /// The pass whose visibility from the frame before stands for this one's: each direction has one of its own, shadow
     /// rays share one (CHC+RT §5.4), but for those to the environment, which go everywhere.
     pub fn visibility_state(self) -> Pass {
         match self {
-            Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment) => self,
+            Pass::Shadow(Lamp::Environment)
+            | Pass::BounceShadow(Lamp::Environment)
+            | Pass::PathShadow(Lamp::Environment) => self,
             Pass::Shadow(_) => Pass::Shadow(Lamp::Sun),
             Pass::BounceShadow(_) => Pass::BounceShadow(Lamp::Sun),
+            Pass::PathShadow(_) => Pass::PathShadow(Lamp::Sun),
             own => own,
         }
     }

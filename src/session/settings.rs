@@ -1,6 +1,6 @@
 //! Every setting of what renders. A method of `secondary/` declares its own in its folder; here each is a line.
 
-use crate::frame::BATCH_SAMPLES;
+use crate::frame::{BATCH_SAMPLES, Effects};
 use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
 use crate::scene::camera::{MAX_FOV_Y_DEGREES, MIN_FOV_Y_DEGREES};
@@ -62,14 +62,18 @@ settings! {
 
         /// What is traced: primary, shadow, ao, diffuse, glossy, environment; with commas between them. All include
         /// primary. `shadow`: of the sun, the lights, and surfaces that emit. `ao`: ambient occlusion of the sky's
-        /// light. `diffuse`: one bounce between surfaces, with the sky's light. `glossy`: what metals and polished
-        /// surfaces mirror. `environment`: the environment's light with shadows; it takes the place of `ao`.
+        /// light. `diffuse`: between surfaces, with the sky's light. `glossy`: what metals and polished surfaces
+        /// mirror; --bounces says how often. `environment`: the environment's light with shadows; it takes the place of
+        /// `ao`.
         effects: EffectList = EffectList::LIT, "--effects LIST", Rule::Any, "", Effects, Common;
         /// Rays of `ao` per pixel and sample.
         ao_rays: u32 = 2, "--ao-rays N", RAYS, "", Effects, Usual;
         /// Length of the rays of `ao`, in world units (metres in glTF), or auto. `auto` is a fifth of the shortest side
         /// of the scene's bounds, but no less than a hundredth of their diagonal and no more than a tenth.
         ao_length: Length = Length::Auto, "--ao-length LENGTH|auto", Rule::Real(1e-6, 1e9), "", Effects, Usual;
+        /// Times that light is reflected between surfaces before it reaches what the camera sees: paths go on from the
+        /// hits of `diffuse` and `glossy`, and may end by chance from the third hit on. 1 is what these show alone.
+        bounces: u32 = 1, "--bounces N", Rule::Whole(1, Effects::MOST_BOUNCES as u64), "", Effects, Usual;
         /// Rays of `diffuse` per pixel and sample; they are as long as the scene.
         diffuse_rays: u32 = 4, "--diffuse-rays N", RAYS, "", Effects, Usual;
         /// Every triangle stops every ray, whatever its alpha.
@@ -352,10 +356,11 @@ impl Settings {
         let maps = chosen.has(Method::Roma) || chosen.has(Method::Sift);
         let fields = chosen.list().iter().any(|(_, method)| method.name() == "df");
         let lit = self.environment.is_some();
-        let needs: [(&str, bool, &str); 27] = [
+        let needs: [(&str, bool, &str); 28] = [
             ("ao_rays", effects.ao, "--effects ao"),
             ("ao_length", effects.ao, "--effects ao"),
             ("diffuse_rays", effects.diffuse, "--effects diffuse"),
+            ("bounces", effects.diffuse || effects.glossy, "--effects diffuse or glossy"),
             ("rotation", effects.ao || effects.diffuse, "--effects ao or diffuse"),
             ("environment_rotation", lit, "--environment"),
             ("environment_intensity", lit, "--environment"),

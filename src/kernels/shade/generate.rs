@@ -178,7 +178,7 @@ pub fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
 }
 
 /// What stands for the ray of a pixel without a hit.
-fn none(origin: Vec3) -> Ray {
+pub(super) fn none(origin: Vec3) -> Ray {
     Ray { origin, t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 }
 }
 

@@ -156,7 +156,7 @@ impl Gloss {
     }
 
     /// Share of light of one radiance from everywhere that the surface reflects otherwise than diffusely.
-    fn around(&self) -> Vec3 {
+    pub(super) fn around(&self) -> Vec3 {
         self.share.map(|c| c * self.under + self.coat_share)
     }
 

@@ -8,6 +8,7 @@ pub mod gloss;
 pub mod halve_rays;
 pub mod lamps;
 pub mod light;
+pub mod paths;
 pub mod random;
 pub mod resolve;
 // A twin's file has the name of its kernel.

@@ -9,8 +9,8 @@ use super::light::{add_light as add, ambient, background, sunlight};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, MET, NONE,
-    PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_SKY, PARAM_SUN,
-    Ray,
+    PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_PATH, PARAM_SKY,
+    PARAM_SUN, Ray,
 };
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, most, normalize, xyz};
@@ -181,7 +181,7 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
 
 /// Adds the light of the pass's lamp to the hits of the shaded set, those of `seen`, whose shadow ray went free. The
 /// environment shares a direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their
-/// gloss.
+/// gloss, and all light with rays by which paths go on.
 pub fn add_light(
     bound: &Bound,
     pixels: &mut Pixels,
@@ -238,6 +238,10 @@ pub fn add_light(
             }
             let reflected = s.reflected(unit);
             reflects = each(|k| reflects[k] + weight * reflected[k]);
+        }
+        if bound.has(PARAM_PATH) && density > 0.0 {
+            let share = outweighs(density, s.path_density(g.normal, normalize(d)));
+            reflects = reflects.map(|c| c * share);
         }
         Some(each(|k| weight_of(&own.hits[index]) * reflects[k] * light[k]))
     });

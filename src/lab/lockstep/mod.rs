@@ -210,14 +210,16 @@ impl Lockstep {
 
     /// Rays that have been made alike on both sides.
     fn generate(&mut self, context: &str, pass: Pass, step: Step, bricks: &BrickStates) -> Result<(), ExecutorError> {
-        self.gpu.run(pass, &[step], bricks)?;
-        self.cpu.run(pass, &[step], bricks)?;
-        let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);
         let surfaces = match pass.set() {
             0 => Vec::new(),
             1 => self.gpu.read_surfaces(Pass::Primary)?,
             _ => self.gpu.read_surfaces(Pass::Glossy)?,
         };
+        self.gpu.run(pass, &[step], bricks)?;
+        self.cpu.run(pass, &[step], bricks)?;
+        // Where rays by which paths go on belong.
+        let pass = if let Step::Continue(number) = step { Pass::Path(number) } else { pass };
+        let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);
         let mut findings = self.findings.lock().expect("findings");
         if pass == Pass::Primary {
             findings.words("camera rays", context, &rays, &own);
@@ -413,7 +415,9 @@ impl Executor for Lockstep {
             self.findings.lock().expect("findings").kernels.extend(names);
         }
         let rest = match steps {
-            [step, rest @ ..] if *step == Step::Generate || own_kernel(step) == Some("dvf_cosine") => {
+            [step, rest @ ..]
+                if matches!(step, Step::Generate | Step::Continue(_)) || own_kernel(step) == Some("dvf_cosine") =>
+            {
                 self.generate(&context, pass, *step, bricks)?;
                 rest
             }

@@ -29,9 +29,9 @@ impl Df {
     fn steps_of(&self, pass: Pass) -> Option<u32> {
         let (method, steps) = match pass {
             Pass::Occlusion(_) => (self.chosen.ao, self.settings.occlusion_steps()),
-            Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => {
-                (self.chosen.shadow, self.settings.shadow_steps())
-            }
+            Pass::Shadow(Lamp::Sun | Lamp::Emitter)
+            | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter)
+            | Pass::PathShadow(Lamp::Sun | Lamp::Emitter) => (self.chosen.shadow, self.settings.shadow_steps()),
             _ => return None,
         };
         (method == Method::Df).then_some(steps)

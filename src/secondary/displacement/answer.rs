@@ -60,9 +60,11 @@ impl Displacement {
         let method = match pass {
             Pass::Occlusion(_) => self.chosen.ao,
             Pass::Diffuse(_) => self.chosen.diffuse,
-            Pass::Shadow(Lamp::Environment) | Pass::BounceShadow(Lamp::Environment) => self.chosen.environment,
-            Pass::Shadow(_) | Pass::BounceShadow(_) => self.chosen.shadow,
-            Pass::Primary | Pass::Glossy => return false,
+            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => match lamp {
+                Lamp::Environment => self.chosen.environment,
+                Lamp::Sun | Lamp::Emitter => self.chosen.shadow,
+            },
+            Pass::Primary | Pass::Glossy | Pass::Path(_) => return false,
         };
         method == Method::Displacement
     }

@@ -54,7 +54,7 @@ impl Roma {
     fn handover(&mut self, pass: Pass) -> &mut Handover {
         let kind = match pass {
             Pass::Occlusion(_) => 0,
-            Pass::BounceShadow(_) => 2,
+            Pass::BounceShadow(_) | Pass::PathShadow(_) => 2,
             _ => 1,
         };
         &mut self.handovers[kind]
@@ -70,7 +70,9 @@ impl Roma {
         match pass {
             Pass::Occlusion(_) => settings.occlusion,
             Pass::Diffuse(_) => settings.diffuse,
-            Pass::Shadow(Lamp::Sun | Lamp::Emitter) | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter) => settings.shadow,
+            Pass::Shadow(Lamp::Sun | Lamp::Emitter)
+            | Pass::BounceShadow(Lamp::Sun | Lamp::Emitter)
+            | Pass::PathShadow(Lamp::Sun | Lamp::Emitter) => settings.shadow,
             _ => None,
         }
     }

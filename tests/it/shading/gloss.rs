@@ -159,6 +159,35 @@ fn white_objects_vanish_in_a_uniform_environment_whatever_their_gloss() {
     assert!(found < 0.6, "a grey metal does not vanish: {found}");
 }
 
+/// White walls lose nothing: all light that comes into an open box leaves it again, after enough bounces.
+#[test]
+fn an_open_white_box_vanishes_after_many_bounces() {
+    let folder = common::folder();
+    let folder = folder.path();
+    let view = path(folder, "into", 40.0, [0.2, 0.1, 3.5], [0.0, 0.0, -0.2]);
+    let image = folder.join("even.exr");
+    write_rgb_file(&image, 32, 16, |_, _| (0.7f32, 0.7f32, 0.7f32)).expect("an environment");
+    // Without the side at z = 1.
+    let open: Vec<_> = cube().into_iter().filter(|(corners, _)| corners.iter().any(|p| p[2] < 1.0)).collect();
+    assert_eq!(open.len(), 5);
+    for (metallic, roughness, coat) in [(0.0, 1.0, 0.0), (0.0, 0.4, 0.0), (1.0, 0.6, 0.0), (0.0, 0.8, 1.0)] {
+        let scene = converted(folder, "open", &white(metallic, roughness, coat), &open);
+        let seen = |options: &str| {
+            let options = format!("--environment {} --spp 64 --diffuse-rays 1 --effects {options}", image.display());
+            mean(&render(&scene, &view, &options)) / 0.7
+        };
+        let what = format!("metallic {metallic}, roughness {roughness}, coat {coat}");
+        for effects in ["environment,diffuse,glossy", "diffuse,glossy"] {
+            let found = seen(&format!("{effects} --bounces 64"));
+            println!("{what}: {found} by {effects}");
+            assert!((found - 1.0).abs() < 0.01, "{what}: {found} by {effects}");
+        }
+        // The control: what comes by one bounce is not all.
+        let found = seen("environment,diffuse,glossy --bounces 1");
+        assert!(found < 0.95, "{what}: {found} by one bounce");
+    }
+}
+
 /// What a white metal reflects of light from `d`, times its cosine, in f64: Trowbridge–Reitz with Smith's masking,
 /// correlated, over what that reflects of light from everywhere (Turquin 2019: the rest leaves after more bounces
 /// between facets, spread alike).

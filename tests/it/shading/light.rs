@@ -108,6 +108,17 @@ fn a_closed_emissive_box_gathers_one_bounce() {
     assert!(gathered.iter().all(|x| (x - 0.375).abs() < 1e-5), "{gathered:?}");
     let alone = render(&scene, &path, &format!("{dark} primary"));
     assert!(alone.iter().all(|x| (x - 0.25).abs() < 1e-6), "{alone:?}");
+    // Of n bounces it is a geometric series. Up to two, no path ends by chance.
+    let series = |n: i32| 0.25 * (1.0 - 0.5f64.powi(n + 1)) / 0.5;
+    for n in [2, 5, 64] {
+        let paths = render(&scene, &path, &format!("{dark} diffuse --diffuse-rays 5 --spp 8 --bounces {n}"));
+        let within = if n == 2 { 1e-5 } else { 0.005 * series(n) };
+        assert!((mean(&paths) - series(n)).abs() < within, "{n} bounces: {}, not {}", mean(&paths), series(n));
+        // By rays to the walls as lamps as well, weighted against those of paths.
+        let lit = format!("{dark} shadow,diffuse --diffuse-rays 2 --spp 128 --bounces {n}");
+        let lit = mean(&render(&scene, &path, &lit));
+        assert!((lit - series(n)).abs() < 0.01 * series(n), "{n} bounces: {lit}, not {}", series(n));
+    }
 }
 
 #[test]

@@ -106,6 +106,8 @@ struct Variant {
     dvf: Option<DvfSettings>,
     /// What levels of detail are selected by, in a scene that has some.
     lod: Lod,
+    /// Bounces.
+    bounces: u32,
 }
 
 const VARIANT: Variant = Variant {
@@ -126,6 +128,7 @@ const VARIANT: Variant = Variant {
     displacement: None,
     dvf: None,
     lod: Lod { pixels: 0.0, blend: false, angle: 0.0, given: false },
+    bounces: 1,
 };
 
 fn effects() -> Effects {
@@ -135,6 +138,7 @@ fn effects() -> Effects {
         occlusion: Some(Occlusion { rays: 1, length: 3.0 }),
         diffuse: Some(1),
         glossy: true,
+        bounces: 1,
         turn_degrees: 360.0,
     }
 }
@@ -274,7 +278,7 @@ fn render(
                 (0.5 * (min + max), normal.normalize())
             }),
             schedule: variant.schedule,
-            effects: effects(),
+            effects: Effects { bounces: variant.bounces, ..effects() },
             samples: 1,
             seed: 3,
             tracing,
@@ -364,6 +368,8 @@ fn twins_agree_with_their_kernels() {
         Variant { budget: Some(1 << 30), everything_fits: true, ..VARIANT },
         Variant { clip: Some(DVec3::new(0.3, 1.0, -0.2)), ..VARIANT },
         Variant { half_rate: true, ..VARIANT },
+        Variant { bounces: 3, ..VARIANT },
+        Variant { bounces: 4, everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { half_rate: true, clip: Some(DVec3::Y), schedule: Schedule::Demand, ..VARIANT },
         Variant { hides: 7, ..VARIANT },
         Variant { hides: 1, schedule: Schedule::Demand, ..VARIANT },

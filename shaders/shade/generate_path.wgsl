@@ -1,0 +1,62 @@
+// One ray from every hit of the shaded set, which a path goes on by, in a direction drawn by what the surface reflects:
+// around the normal by its diffuse part, else by its gloss. The throughput is what was carried so far times what is
+// reflected, and the density by which the direction was drawn is noted. From the third ray on, paths that lose light
+// end by chance, and what goes on makes up for them (Russian roulette: Arvo, Kirk 1990). Then this set is moved to that
+// before it.
+#include "common/types.wgsl"
+#include "common/bindings.wgsl"
+#include "shade/shading.wgsl"
+#include "common/random.wgsl"
+#include "shade/lamps.wgsl"
+#include "shade/light.wgsl"
+#include "shade/gloss.wgsl"
+#include "shade/paths.wgsl"
+#include "shade/cones.wgsl"
+
+// The first ray of a path that may end by chance: that of the third hit.
+const FIRST_CHANCE: u32 = 3u;
+// No path goes on for certain from there, so that all end.
+const MOST_LIKELY: f32 = 0.95;
+
+// One thread a pixel.
+@compute @workgroup_size(8, 8)
+fn main(@builtin(global_invocation_id) global: vec3<u32>) {
+    if global.x >= params.width || global.y >= params.height {
+        return;
+    }
+    let index = global.y * params.width + global.x;
+    let surface = seen_surfaces[index];
+    let before = throughput[index];
+    var ray = Ray(surface.point, 1.0, vec3<f32>(0.0, 1.0, 0.0), 0.0);
+    var carried = vec3<f32>(0.0);
+    var density = 0.0;
+    var alpha = 0.0;
+    if surface.leaf != NONE && max(before.x, max(before.y, before.z)) > 0.0 {
+        let g = gbuffer[index];
+        let s = gloss_of(g, -seen_rays[index].direction);
+        let words = random4(pixel_of(index) ^ pcg(u32(before.w) + 1u), params.stream, params.seed);
+        ray.direction = path_direction(s, g.normal, words);
+        density = path_density(s, g.normal, ray.direction);
+        if density > 0.0 && dot(surface.normal, ray.direction) > 0.0 {
+            let reflects = s.diffuse + reflected(s, ray.direction);
+            let weight = reflects * (dot(g.normal, ray.direction) / (PI * density));
+            var chance = 1.0;
+            if params.direction >= FIRST_CHANCE {
+                chance = min(max(weight.x, max(weight.y, weight.z)), MOST_LIKELY);
+            }
+            if unit(pcg(words.w)) < chance {
+                ray.t_min = 0.0;
+                ray.t_max = T_INFINITE;
+                alpha = select(1.0, greatest_alpha(s), is_glossy(s));
+                carried = before.rgb * weight / chance;
+            }
+        }
+    }
+    rays[index] = ray;
+    throughput[index] = vec4<f32>(carried, before.w);
+    densities[index] = density;
+    start_hit(index, ray.t_max, seen_hits[index].id);
+    if ray.t_max > 0.0 {
+        widen_reflected(index, density, alpha);
+    }
+}
