@@ -5,10 +5,10 @@
     tools/mitsuba.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR
 
 The scene is Sponza with a colour a material and neither textures nor normals, so that both shade the same surfaces.
-Cases: the sun alone, an environment alone, ambient occlusion, sun and environment with one bounce; three views of
-paths/. Pictures are kept in DIR and not made twice; Mitsuba's are kept after every 64 samples. The same command goes on
-with a run that was interrupted. One DIR is for one build of brickwalk: a new build needs a new DIR, or one without the
-folders CASE-VIEW-SPP.
+Cases: the sun alone, an environment alone, ambient occlusion, sun and environment with one bounce, and with four and
+eight (`bounce-4`, `bounce-8`); three views of paths/. Pictures are kept in DIR and not made twice; Mitsuba's are kept
+after every 64 samples. The same command goes on with a run that was interrupted. One DIR is for one build of brickwalk:
+a new build needs a new DIR, or one without the folders CASE-VIEW-SPP.
 
 A row of the table is a picture: the relative difference of the means, with one standard error of Mitsuba's; that of the
 channel that differs most; of the mean of the worst tile of 20 x 20 pixels; of pixels on the average; HDR-FLIP
@@ -52,6 +52,12 @@ CONTROLS = {
     "environment": ("the environment turned by 90 degrees about the vertical", ("environment", "bounce")),
 }
 COMPONENT = {5126: np.float32, 5125: np.uint32, 5123: np.uint16}
+
+
+def split(case):
+    """The kind of light of a case, and how many bounces it has."""
+    kind, _, bounces = case.partition("-")
+    return kind, int(bounces or kind == "bounce")
 
 
 def colour(index):
@@ -189,21 +195,21 @@ class Reference:
         mi = self.mi
         scene = {"type": "scene", "sensor": self.sensor(view), **self.shapes}
         about_y = mi.ScalarTransform4f().rotate
-        if case in ("sun", "bounce"):
+        kind, bounces = split(case)
+        if kind in ("sun", "bounce"):
             toward = about_y([0, 1, 0], 2 if self.control == "sun" else 0).matrix
             scene["sun"] = {
                 "type": "directional",
                 "direction": (np.array(toward)[:3, :3] @ -SUN).tolist(),
                 "irradiance": {"type": "rgb", "value": (np.pi * SUN_INTENSITY * SUN_COLOR).tolist()},
             }
-        if case in ("environment", "bounce"):
+        if kind in ("environment", "bounce"):
             # Both look at an image's middle along -Z (this program) and +Z turned by half (Mitsuba).
             turn = about_y([0, 1, 0], 180 + (90 if self.control == "environment" else 0))
             scene["environment"] = {"type": "envmap", "filename": str(environment), "to_world": turn}
         if case == "ao":
             scene["environment"] = {"type": "constant", "radiance": 1.0}
-        depth = {"sun": 2, "environment": 2, "ao": 2, "bounce": 3}[case]
-        scene["integrator"] = {"type": "path", "max_depth": depth, "rr_depth": 1000}
+        scene["integrator"] = {"type": "path", "max_depth": 2 + bounces, "rr_depth": 1000}
         return mi.load_dict(scene)
 
     def render(self, scene, number):
@@ -266,8 +272,11 @@ def ours(binary, bricks, case, view, environment, white, spp, folder):
     if not took.exists():
         words = [binary, "walk", bricks, "-o", folder, "--path", view, "--frames", "1"]
         words += ["--size", f"{SIZE[0]}x{SIZE[1]}", "--quality", "exact"]
-        words += ["--spp", str(spp), "--aov", "--cache", "100%", *LIGHT[case]]
-        if case in ("environment", "bounce"):
+        kind, bounces = split(case)
+        words += ["--spp", str(spp), "--aov", "--cache", "100%", *LIGHT[kind]]
+        if bounces > 1:
+            words += ["--bounces", str(bounces)]
+        if kind in ("environment", "bounce"):
             words += ["--environment", environment]
         if case == "ao":
             words += ["--environment", white]
@@ -325,7 +334,8 @@ def parse():
     arguments.add_argument(
         "--reference-spp", type=int, help="samples a pixel of Mitsuba, a multiple of 64 (default as --spp)"
     )
-    arguments.add_argument("--cases", default="sun,environment,ao,bounce", help="of these (default all)")
+    every = "sun,environment,ao,bounce,bounce-4,bounce-8"
+    arguments.add_argument("--cases", default=every, help=f"of these; bounce-N has N bounces (default {every})")
     arguments.add_argument("--views", default="1,3,5", help="numbers of paths/sponza_N.json (default 1,3,5)")
     arguments.add_argument(
         "--variant", choices=["scalar_rgb", "llvm_ad_rgb"], default="scalar_rgb", help="of Mitsuba (default scalar_rgb)"
@@ -342,11 +352,11 @@ def parse():
     options.cases, options.views = options.cases.split(","), options.views.split(",")
     if options.reference_spp % BATCH:
         arguments.error(f"--reference-spp must be a multiple of {BATCH}")
-    unknown = set(options.cases) - set(LIGHT)
+    unknown = {case for case in options.cases if split(case)[0] not in LIGHT or ("-" in case and split(case)[1] < 1)}
     if unknown:
         arguments.error(f"--cases: no case is named {', '.join(sorted(unknown))}")
     if options.control:
-        options.cases = [case for case in options.cases if case in CONTROLS[options.control][1]]
+        options.cases = [case for case in options.cases if split(case)[0] in CONTROLS[options.control][1]]
     return options
 
 

@@ -161,7 +161,8 @@ pub struct Record {
     /// Frame, from 0.
     pub frame: u32,
     /// The effect: `primary`, `shadow`, `environment`, `ao`, `diffuse`, `glossy`, and of the rays to lamps from the
-    /// hits of bounces `diffuse-shadow`, `diffuse-environment`, `glossy-shadow`, `glossy-environment`; `rsm`, where
+    /// hits of bounces `diffuse-shadow`, `diffuse-environment`, `glossy-shadow`, `glossy-environment`; of bounces
+    /// after the first `bounce-2`, `bounce-2-shadow`, `bounce-2-environment` and so on; `rsm`, where
     /// reflective shadow maps are made; `dvf`, where the cells of a field of visibility are made anew for what moves.
     pub pass: &'static str,
     counters: Counters,

@@ -128,7 +128,7 @@ pub fn effects(settings: &Settings) -> Effects {
         occlusion: (all.ao && !all.environment).then_some(occlusion),
         diffuse: all.diffuse.then_some(settings.diffuse_rays),
         glossy: all.glossy,
-        bounces: settings.bounces,
+        bounces: settings.bounces.of(all),
         turn_degrees: settings.rotation.0,
     }
 }

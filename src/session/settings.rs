@@ -10,8 +10,8 @@ use crate::secondary::df;
 use crate::secondary::{EffectMethods, Method, displacement, dvf, roma, rsm};
 use crate::settings::file::{read_toml, to_toml};
 use crate::settings::{
-    Adapter, CacheSize, Direction, EffectList, Entry, Environment, ErrorLimit, FrameBudget, Group, HostCacheSize,
-    ImageSize, Length, Plane, Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
+    Adapter, Bounces, CacheSize, Direction, EffectList, Entry, Environment, ErrorLimit, FrameBudget, Group,
+    HostCacheSize, ImageSize, Length, Plane, Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
 };
 use std::path::PathBuf;
 
@@ -26,6 +26,7 @@ pub use presets::Quality;
 const ANY: f64 = f64::INFINITY;
 /// Rays of a pixel and sample.
 const RAYS: Rule = Rule::Whole(1, 1024);
+const BOUNCES: Rule = Rule::Whole(1, Effects::MOST_BOUNCES as u64);
 
 settings! {
     /// Everything that can be chosen about what renders.
@@ -60,20 +61,20 @@ settings! {
         /// and `convert --movable`. [default: nothing moves]
         motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
 
-        /// What is traced: primary, shadow, ao, diffuse, glossy, environment; with commas between them. All include
+        /// What is traced: primary, shadow, ao, diffuse, glossy, environment, path; with commas between them. All include
         /// primary. `shadow`: of the sun, the lights, and surfaces that emit. `ao`: ambient occlusion of the sky's
         /// light. `diffuse`: between surfaces, with the sky's light. `glossy`: what metals and polished surfaces
         /// mirror; --bounces says how often. `environment`: the environment's light with shadows; it takes the place of
-        /// `ao`.
+        /// `ao`. `path`: all of these but `ao`, and eight bounces.
         effects: EffectList = EffectList::LIT, "--effects LIST", Rule::Any, "", Effects, Common;
         /// Rays of `ao` per pixel and sample.
         ao_rays: u32 = 2, "--ao-rays N", RAYS, "", Effects, Usual;
         /// Length of the rays of `ao`, in world units (metres in glTF), or auto. `auto` is a fifth of the shortest side
         /// of the scene's bounds, but no less than a hundredth of their diagonal and no more than a tenth.
         ao_length: Length = Length::Auto, "--ao-length LENGTH|auto", Rule::Real(1e-6, 1e9), "", Effects, Usual;
-        /// Times that light is reflected between surfaces before it reaches what the camera sees: paths go on from the
-        /// hits of `diffuse` and `glossy`, and may end by chance from the third hit on. 1 is what these show alone.
-        bounces: u32 = 1, "--bounces N", Rule::Whole(1, Effects::MOST_BOUNCES as u64), "", Effects, Usual;
+        /// Times that light is reflected between surfaces on its way, or auto: 8 with `path`, else 1. Paths go on from
+        /// the hits of `diffuse` and `glossy`; from the third hit on they may end by chance.
+        bounces: Bounces = Bounces::Auto, "--bounces N|auto", BOUNCES, "", Effects, Usual;
         /// Rays of `diffuse` per pixel and sample; they are as long as the scene.
         diffuse_rays: u32 = 4, "--diffuse-rays N", RAYS, "", Effects, Usual;
         /// Every triangle stops every ray, whatever its alpha.
@@ -232,7 +233,7 @@ settings! {
         measure_needed: bool = false, "--measure-needed", Rule::Any, "", Measurement, Expert;
         /// Record how far each effect is from the exact picture (`error_mean`, `error_worst_tile`, `error_pixels`). A
         /// second session renders that picture: it takes twice the time and device memory.
-        measure_error: bool = false, "--measure-error", Rule::Any, "", Measurement, Usual;
+        measure_error: bool = false, "--measure-error", Rule::Any, "", Measurement, Expert;
         /// State in `summary.json` what leaving out what a scene does not need saves. The first frame is rendered six
         /// times more for each thing that is left out, in sessions of their own.
         measure_left_out: bool = false, "--measure-left-out", Rule::Any, "", Measurement, Expert;

@@ -23,7 +23,7 @@ pub mod value;
 pub use group::{Entry, Field, Group, Heading, Level, SettingsError};
 pub use sizes::{CacheSize, ErrorLimit, FrameBudget, HostCacheSize, ImageSize};
 pub use types::{
-    Adapter, Direction, Effect, EffectList, Environment, Length, Plane, Policy, Rectangle, Schedule, Turn,
+    Adapter, Bounces, Direction, Effect, EffectList, Environment, Length, Plane, Policy, Rectangle, Schedule, Turn,
 };
 pub use value::{Lines, Plain, Rule, Value};
 

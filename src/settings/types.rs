@@ -60,6 +60,8 @@ names! {
         Glossy = "glossy",
         /// Rays towards the environment.
         Environment = "environment",
+        /// All light, reflected again and again.
+        Path = "path",
     }
 }
 
@@ -76,11 +78,14 @@ pub struct EffectList {
     pub glossy: bool,
     /// Rays towards the environment.
     pub environment: bool,
+    /// All of these but `ao`, and as many bounces as [`Bounces::Auto`] has then.
+    pub path: bool,
 }
 
 impl EffectList {
     /// Primary rays alone.
-    pub const PRIMARY: Self = Self { shadow: false, ao: false, diffuse: false, glossy: false, environment: false };
+    pub const PRIMARY: Self =
+        Self { shadow: false, ao: false, diffuse: false, glossy: false, environment: false, path: false };
     /// Primary rays and shadows.
     pub const SHADOW: Self = Self { shadow: true, ..Self::PRIMARY };
     /// Primary rays, shadows, and ambient occlusion.
@@ -89,23 +94,26 @@ impl EffectList {
     /// Primary rays and these.
     pub fn of(effects: &[Effect]) -> Self {
         let has = |effect| effects.contains(&effect);
+        let path = has(Effect::Path);
         Self {
-            shadow: has(Effect::Shadow),
+            shadow: path || has(Effect::Shadow),
             ao: has(Effect::Ao),
-            diffuse: has(Effect::Diffuse),
-            glossy: has(Effect::Glossy),
-            environment: has(Effect::Environment),
+            diffuse: path || has(Effect::Diffuse),
+            glossy: path || has(Effect::Glossy),
+            environment: path || has(Effect::Environment),
+            path,
         }
     }
 
     fn list(self) -> Vec<Effect> {
         let all = [
             (true, Effect::Primary),
-            (self.shadow, Effect::Shadow),
+            (self.shadow && !self.path, Effect::Shadow),
             (self.ao, Effect::Ao),
-            (self.diffuse, Effect::Diffuse),
-            (self.glossy, Effect::Glossy),
-            (self.environment, Effect::Environment),
+            (self.diffuse && !self.path, Effect::Diffuse),
+            (self.glossy && !self.path, Effect::Glossy),
+            (self.environment && !self.path, Effect::Environment),
+            (self.path, Effect::Path),
         ];
         all.into_iter().filter(|(is_on, _)| *is_on).map(|(_, effect)| effect).collect()
     }
@@ -286,6 +294,45 @@ impl Value for Length {
     }
 }
 
+/// Times that light is reflected between surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bounces {
+    /// [`Bounces::OF_PATHS`] where the effects have `path`, else one.
+    Auto,
+    /// So many.
+    Count(u32),
+}
+
+impl Bounces {
+    /// Those of `--effects path`.
+    pub const OF_PATHS: u32 = 8;
+
+    /// With these effects.
+    pub fn of(self, effects: EffectList) -> u32 {
+        match self {
+            Self::Auto if effects.path => Self::OF_PATHS,
+            Self::Auto => 1,
+            Self::Count(count) => count,
+        }
+    }
+}
+
+impl Value for Bounces {
+    fn read(text: &str, rule: Rule, unit: &str) -> Result<Self, String> {
+        match text {
+            AUTO => Ok(Self::Auto),
+            text => u32::read(text, rule, unit).map(Self::Count).map_err(|why| format!("{why}, or auto")),
+        }
+    }
+
+    fn plain(&self) -> Plain {
+        match self {
+            Self::Auto => Plain::Text(AUTO.into()),
+            Self::Count(count) => count.plain(),
+        }
+    }
+}
+
 /// What surrounds a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Environment {
@@ -407,6 +454,22 @@ mod tests {
             assert_eq!(length.plain().to_string(), text);
         }
         assert!(Length::read("0", rule, "").unwrap_err().ends_with("or auto"));
+    }
+
+    #[test]
+    fn paths_are_all_effects_and_eight_bounces() {
+        let list = |text| EffectList::read(text, Rule::Any, "").unwrap();
+        let (path, one) = (list("path"), list("primary,diffuse"));
+        assert!(path.shadow && path.diffuse && path.glossy && path.environment && !path.ao);
+        assert_eq!(path.to_string(), "primary,path");
+        assert_eq!(list("primary,path"), path);
+        let rule = Rule::Whole(1, 64);
+        for (text, of_path, of_one) in [("auto", 8, 1), ("1", 1, 1), ("64", 64, 64)] {
+            let bounces = Bounces::read(text, rule, "").unwrap();
+            assert_eq!((bounces.of(path), bounces.of(one)), (of_path, of_one));
+            assert_eq!(bounces.plain().to_string(), text);
+        }
+        assert!(Bounces::read("65", rule, "").unwrap_err().ends_with("or auto"));
     }
 
     #[test]

@@ -177,7 +177,7 @@ fn an_open_white_box_vanishes_after_many_bounces() {
             mean(&render(&scene, &view, &options)) / 0.7
         };
         let what = format!("metallic {metallic}, roughness {roughness}, coat {coat}");
-        for effects in ["environment,diffuse,glossy", "diffuse,glossy"] {
+        for effects in ["environment,diffuse,glossy", "diffuse,glossy", "path"] {
             let found = seen(&format!("{effects} --bounces 64"));
             println!("{what}: {found} by {effects}");
             assert!((found - 1.0).abs() < 0.01, "{what}: {found} by {effects}");

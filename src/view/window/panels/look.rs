@@ -1,8 +1,9 @@
 //! Where the camera is, and what pictures are made of.
 
+use crate::frame::Effects;
 use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
-use crate::settings::{Direction, EffectList};
+use crate::settings::{Bounces, Direction, EffectList};
 use crate::view::window::desk::Desk;
 use egui::{ComboBox, DragValue, Slider, Ui};
 use glam::DVec3;
@@ -79,7 +80,8 @@ fn clip(desk: &mut Desk, ui: &mut Ui) {
 /// Effects and quality.
 pub fn picture(desk: &mut Desk, ui: &mut Ui) {
     let settings = &mut desk.viewer.settings;
-    let EffectList { shadow, ao, diffuse, glossy, environment } = &mut settings.effects;
+    let mut bounces = settings.bounces.of(settings.effects);
+    let EffectList { shadow, ao, diffuse, glossy, environment, path } = &mut settings.effects;
     ui.horizontal_wrapped(|ui| {
         ui.checkbox(shadow, "shadows");
         ui.checkbox(ao, "occlusion");
@@ -87,6 +89,12 @@ pub fn picture(desk: &mut Desk, ui: &mut Ui) {
         ui.checkbox(glossy, "reflections");
         ui.checkbox(environment, "environment's shadows");
     });
+    *path &= *shadow && *diffuse && *glossy && *environment;
+    let is_reflected = *diffuse || *glossy;
+    let slider = Slider::new(&mut bounces, 1..=Effects::MOST_BOUNCES).logarithmic(true).text("bounces");
+    if ui.add_enabled(is_reflected, slider).changed() {
+        settings.bounces = Bounces::Count(bounces);
+    }
     ui.add(Slider::new(&mut settings.spp, 1..=4096).logarithmic(true).text("samples a pixel"));
     ui.add(Slider::new(&mut settings.lod, 0.0..=8.0).text("detail at rest, pixels")).on_hover_text(
         "The error at which levels of detail stand for bricks; 0 is exact. While moving it is at least 1.",
