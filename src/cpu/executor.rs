@@ -270,7 +270,10 @@ impl Executor for CpuExecutor {
                 run_kernel(&dispatch, pass, &bound, &mut self.buffers, &attributes, (sampling, &tile_demand), binary)?;
                 if dispatch.kernel == names::generate_path {
                     // What it has made belongs to the set before.
-                    self.buffers.sets.swap(1, 2);
+                    let [_, seen, own] = &mut self.buffers.sets;
+                    seen.rays.clone_from(&own.rays);
+                    seen.hits.clone_from(&own.hits);
+                    seen.surfaces.clone_from(&own.surfaces);
                 }
                 if let Some(phase) = dispatch.phase {
                     ms_phases[phase] += start.elapsed().as_secs_f64() * 1e3;

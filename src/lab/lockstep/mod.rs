@@ -414,11 +414,19 @@ impl Executor for Lockstep {
             let names = list.iter().map(|dispatch| dispatch.kernel);
             self.findings.lock().expect("findings").kernels.extend(names);
         }
+        let mut pass = pass;
         let rest = match steps {
             [step, rest @ ..]
                 if matches!(step, Step::Generate | Step::Continue(_)) || own_kernel(step) == Some("dvf_cosine") =>
             {
                 self.generate(&context, pass, *step, bricks)?;
+                if let Step::Continue(number) = *step {
+                    // Both sets hold what was made.
+                    let (rays, surfaces) = (self.gpu.read_rays(pass)?, self.gpu.read_surfaces(pass)?);
+                    self.cpu.set_rays(pass, &rays);
+                    self.cpu.set_surfaces(pass, surfaces);
+                    pass = Pass::Path(number);
+                }
                 rest
             }
             all => all,
