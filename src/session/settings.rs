@@ -61,9 +61,9 @@ settings! {
         /// and `convert --movable`. [default: nothing moves]
         motion: Option<PathBuf> = None, "--motion M.json", Rule::Any, "", Camera, Usual;
 
-        /// What is traced: primary, shadow, ao, diffuse, glossy, environment, path; with commas between them. All include
-        /// primary. `shadow`: of the sun, the lights, and surfaces that emit. `ao`: ambient occlusion of the sky's
-        /// light. `diffuse`: between surfaces, with the sky's light. `glossy`: what metals and polished surfaces
+        /// What is traced: primary, shadow, ao, diffuse, glossy, environment, path; with commas between them. All
+        /// include primary. `shadow`: of the sun, the lights, and surfaces that emit. `ao`: ambient occlusion of the
+        /// sky's light. `diffuse`: between surfaces, with the sky's light. `glossy`: what metals and polished surfaces
         /// mirror; --bounces says how often. `environment`: the environment's light with shadows; it takes the place of
         /// `ao`. `path`: all of these but `ao`, and eight bounces.
         effects: EffectList = EffectList::LIT, "--effects LIST", Rule::Any, "", Effects, Common;
