@@ -43,7 +43,7 @@ impl Gloss {
         normalize(each(|k| level * around.cos() * x[k] + level * around.sin() * y[k] + up * normal[k]))
     }
 
-    /// By which [`Self::path_direction`] draws d, a unit vector.
+    /// By which a path draws its direction d, a unit vector.
     pub fn path_density(&self, normal: Vec3, d: Vec3) -> f32 {
         let choice = self.path_choice();
         (1.0 - choice) * most(dot(normal, d), 0.0) / PI + choice * self.density(d)
