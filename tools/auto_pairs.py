@@ -4,9 +4,9 @@
 Usage: tools/auto_pairs.py S.bricks... [--rates FILE] [options]
 
 Of each effect, error and cache walks take turns: exact ones, ones by auto, and ones by the fixed method that is fastest
-within the error, where there is one. Their times are compared turn by turn, and the medians of the ratios are printed:
-processor times, user and system, or with `--clock wall` those of all frames, as records have them. One more walk by
-auto, along another path where one is given, measures the error of its frames against exact ones of the same rays: 100
+within the error, where there is one. Their times are compared turn by turn, and the medians of the ratios are printed,
+by two clocks: processor times of whole walks, user and system, and wall times of all frames, as records have them. One
+more walk by auto, along another path where one is given, measures the error of its frames against exact ones of the same rays: 100
 times the root of the mean relMSE, or FLIP.
 """
 
@@ -49,7 +49,7 @@ FIXED = {
 
 
 def walk(args, scene, effect, cache, secondary, output, more=()):
-    """Seconds that a walk takes, and its summary."""
+    """Seconds that a walk takes, by both clocks: the processor's, and the wall's of all frames; and its summary."""
     words = [args.program, "walk", str(scene), "-o", output, "--quality", "exact", "--adapter", args.adapter]
     words += ["--size", args.size, "--frames", str(args.frames), "--cache", cache, *ALONE[effect], *secondary, *more]
     process = subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
@@ -58,10 +58,8 @@ def walk(args, scene, effect, cache, secondary, output, more=()):
     if status != 0:
         sys.exit(f"{' '.join(words)}\n{said}")
     summary = json.loads(pathlib.Path(output, "summary.json").read_text())
-    if args.clock == "processor":
-        return usage.ru_utime + usage.ru_stime, summary
     lines = pathlib.Path(output, "records.jsonl").read_text().splitlines()
-    return sum(json.loads(line)["ms"] for line in lines) / 1e3, summary
+    return (usage.ru_utime + usage.ru_stime, sum(json.loads(line)["ms"] for line in lines) / 1e3), summary
 
 
 def errors(args, own, exact, error):
@@ -83,7 +81,7 @@ def best_fixed(args, scene, effect, cache, error, folder):
     for name, options in FIXED[effect].items():
         seconds, _ = walk(args, scene, effect, cache, options.split(), own, ["--aov"])
         if max(errors(args, own, exact, error)) <= float(error.rstrip("%")):
-            found.append((seconds, name, options.split()))
+            found.append((seconds[0], name, options.split()))
     return min(found)[1:] if found else None
 
 
@@ -102,19 +100,20 @@ def cell(args, scene, effect, cache, error):
                 summary = found if name == "auto" else summary
             for name in ways:
                 if name != "auto":
-                    ratios[name].append(times["auto"] / times[name])
+                    ratios[name].append([own / other for own, other in zip(times["auto"], times[name], strict=True)])
         path = ["--path", args.other_path] if args.other_path else []
         _, other = walk(args, scene, effect, cache, auto, f"{folder}/auto", ["--aov", *path])
         walk(args, scene, effect, cache, [], f"{folder}/exact", ["--aov", *path])
         found = errors(args, f"{folder}/auto", f"{folder}/exact", error)
     taken = (summary or other)["secondary_auto"]["effects"][effect]
     frames = ", ".join(f"{name} {count}" for name, count in taken["frames"].items())
-    exact, beside = ratios["exact"], ratios["fixed"]
     columns = [pathlib.Path(scene).stem, effect, cache, error]
-    columns.append(f"{statistics.median(exact):.3f}" if exact else "–")
-    columns.append(f"{min(exact):.3f} to {max(exact):.3f}" if exact else "–")
-    if args.fixed:
-        columns += [fixed[0], f"{statistics.median(beside):.3f}"] if fixed and beside else ["none", "–"]
+    for way in ["exact", "fixed"] if args.fixed else ["exact"]:
+        if way == "fixed":
+            columns.append(fixed[0] if fixed else "none")
+        for clock in zip(*ratios[way], strict=True) if ratios[way] else [[], []]:
+            columns.append(f"{statistics.median(clock):.3f}" if clock else "–")
+            columns.append(f"{min(clock):.3f} to {max(clock):.3f}" if clock else "–")
     columns.append(f"{statistics.mean(found):.3g}, most {max(found):.3g}")
     print(f"| {' | '.join(columns)} | {frames} |", flush=True)
 
@@ -131,15 +130,15 @@ def main():
     parser.add_argument("--frames", type=int, default=32, help="frames a walk")
     parser.add_argument("--size", default="640x360", help="pixels")
     parser.add_argument("--adapter", default="cpu", help="what renders")
-    parser.add_argument("--clock", default="processor", choices=["processor", "wall"], help="what times are taken by")
     parser.add_argument("--fixed", action="store_true", help="measure the best fixed method as well")
     parser.add_argument("--no-head", action="store_true", help="print rows alone")
     parser.add_argument("--other-path", help="camera path of the walks that errors are measured of")
     parser.add_argument("--program", default="target/release/brickwalk", help="the program")
     args = parser.parse_args()
     if not args.no_head:
-        beside = ["best fixed", "auto over it"] if args.fixed else []
-        head = ["scene", "effect", "cache", "--error", "auto over exact", "of the turns", *beside, "error", "frames"]
+        clocks = ["of the turns", "frames", "of the turns"]
+        beside = ["best fixed", "auto over it", *clocks] if args.fixed else []
+        head = ["scene", "effect", "cache", "--error", "auto over exact", *clocks, *beside, "error", "taken"]
         print(f"| {' | '.join(head)} |\n|{' --- |' * len(head)}")
     for scene in args.scenes:
         for effect in args.effects.split(","):
