@@ -262,6 +262,9 @@ pub const MATERIAL_BLEND: u32 = 2;
 pub const MATERIAL_DOUBLE_SIDED: u32 = 4;
 /// [`Material::flags`]: KHR_materials_unlit.
 pub const MATERIAL_UNLIT: u32 = 8;
+/// [`Material::flags`]: the surface of a closed body that bends light (KHR_materials_volume); together with BLEND. Where
+/// paths do not follow light through it, rays pass as through thin walls.
+pub const MATERIAL_REFRACTS: u32 = 16;
 
 /// Textures of a material, each with its place in [`Material::uv_from_set`] and [`Material::uv_sets`].
 pub const MATERIAL_TEXTURES: usize = 5;
@@ -313,18 +316,19 @@ pub struct Material {
     pub occlusion_strength: f32,
     /// Share of the surface that a clear coat covers (KHR_materials_clearcoat), 0..=1.
     pub clearcoat: f32,
-    /// What the dielectric part reflects along the normal, linear RGB, 0..=1.
+    /// What the dielectric part reflects along the normal, linear RGB, 0..=1. Of a body that refracts the red one stands
+    /// for its index of refraction, (1 + sqrt r) / (1 - sqrt r), and is less than 1.
     pub specular: [f32; 3],
     /// What it reflects at grazing angles, 0..=1.
     pub specular_weight: f32,
     /// Roughness of the clear coat, 0..=1.
     pub clearcoat_roughness: f32,
-    /// Share of the light that thin walls let through (KHR_materials_transmission), 0..=1.
+    /// Share of the light that thin walls or a body let through (KHR_materials_transmission), 0..=1.
     pub transmission: f32,
     /// Bit i: texture i takes the second set of texture coordinates ([`AttributeDetail::uv`]).
     pub uv_sets: u32,
-    /// Zero.
-    pub _reserved: u32,
+    /// What a body that refracts takes from light (KHR_materials_volume), as [`pack_absorption`] has it; else zero.
+    pub absorption: u32,
     /// Two rows a texture: of the set's coordinates (s, t) the coordinate is a s + b t + c by a row (a, b, c, d). The
     /// fourth of the first row is the absolute determinant, by which areas grow; of the second row it is zero.
     pub uv_from_set: [[f32; 4]; 2 * MATERIAL_TEXTURES],
@@ -362,7 +366,7 @@ impl Material {
         clearcoat_roughness: 0.0,
         transmission: 0.0,
         uv_sets: 0,
-        _reserved: 0,
+        absorption: 0,
         uv_from_set: Self::SAME_UV,
     };
 
@@ -398,6 +402,28 @@ impl Material {
     pub fn needs_details(&self) -> bool {
         self.normal_texture != NONE || self.uv_sets != 0
     }
+}
+
+/// [`Material::absorption`] of these, linear RGB, per world unit: of light that goes d units through the body
+/// exp(-absorption d) is left. Three mantissas of 9 bits from the low bits up, then an exponent of 5 that they share: a
+/// component is its mantissa times 2^(exponent - 24). What is more than 65,408 becomes that, what is no number zero.
+pub fn pack_absorption(absorption: [f64; 3]) -> u32 {
+    let held = absorption.map(|c| if c > 0.0 { c.min(65_408.0) } else { 0.0 });
+    let greatest = held.into_iter().fold(0.0, f64::max);
+    if greatest == 0.0 {
+        return 0;
+    }
+    // The least exponent with which the greatest mantissa, rounded, has 9 bits.
+    let fits = |exponent: &u32| (greatest * f64::exp2(24.0 - f64::from(*exponent))).round() < 512.0;
+    let exponent = (0..=31).find(fits).unwrap_or(31);
+    let mantissa = |c: f64| (c * f64::exp2(24.0 - f64::from(exponent))).round() as u32;
+    mantissa(held[0]) | mantissa(held[1]) << 9 | mantissa(held[2]) << 18 | exponent << 27
+}
+
+/// What [`pack_absorption`] packed.
+pub fn unpack_absorption(word: u32) -> [f32; 3] {
+    let scale = f32::exp2((word >> 27) as f32 - 24.0);
+    [0, 9, 18].map(|shift| (word >> shift & 511) as f32 * scale)
 }
 
 /// [`Texture::wrap`]: repeat.

@@ -17,7 +17,7 @@ struct Params {           // What every kernel is told.
     seed: u32,            // of all random numbers
     instance_pad: f32,    // relative padding of top-level boxes for the rounding of instance rays
     sun_radius: f32,      // tangent of the sun's angular radius
-    origin: vec4<f32>,    // camera position in the frame, device units
+    origin: vec4<f32>,    // camera position in the frame, device units; w: world units of a device unit
     base: vec4<f32>,      // direction of pixel coordinate (0, 0)
     step_x: vec4<f32>,    // change of direction per pixel in x
     step_y: vec4<f32>,    // change of direction per pixel in y; w: angle that a sample stands for, radians
@@ -62,6 +62,7 @@ const PARAM_BOUNCE: u32 = 16u;    // the hits that are shaded are those of set 1
 const PARAM_EMITTER: u32 = 32u;   // the pass's lamp is one of the emitters
 const PARAM_ENVIRONMENT: u32 = 64u; // the pass's lamp is the environment
 const PARAM_PATH: u32 = 32768u;  // the paths of the hits that are shaded go on: rays of theirs may meet the lamps
+const PARAM_REFRACT: u32 = 65536u; // light is bent by bodies that refract; no ray passes straight through them
 const PARAM_SCATTER: u32 = 4096u;    // every pixel has a direction of its own around the normal
 const PARAM_TIGHTER: u32 = 128u;  // pairs are queried by the boxes of the node's children
 const PARAM_NEXT: u32 = 256u;     // a ray asks up to the first brick that it enters of those it asks for, not for all

@@ -57,7 +57,7 @@ struct Brick {            // Where the parts of a brick lie in its payloads. Off
 struct Opacity {          // By what a material lets rays pass.
     factor: f32,          // alpha of the base colour factor
     cutoff: f32,          // of MASK
-    blends: u32,          // 1: BLEND
+    blends: u32,          // bit 0: BLEND; bit 1: a body that refracts
     texels: u32,          // first vector of the texels in the table; NONE without a map
     width: u32,           // texels of a row of the map
     height: u32,          // rows of the map

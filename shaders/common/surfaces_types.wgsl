@@ -16,12 +16,12 @@ struct Material {         // What surfaces are made of, as in the scene file.
     normal_scale: f32,    // of x and y of the normal texture
     occlusion_strength: f32, // 0 to 1; 0: nothing of the texture
     clearcoat: f32,       // share of the surface that a clear coat covers
-    specular: vec3<f32>,  // what the dielectric part reflects along the normal
+    specular: vec3<f32>,  // what the dielectric part reflects along the normal; of a body: by its index of refraction
     specular_weight: f32, // what it reflects at grazing angles
     clearcoat_roughness: f32, // 0 to 1
-    transmission: f32,    // share of light that thin walls let through
+    transmission: f32,    // share of light that thin walls or a body let through
     uv_sets: u32,         // bit i: texture i takes the second set of coordinates
-    padding: u32,
+    absorption: u32,      // of a body that refracts, per world unit: mantissas of 9 bits, an exponent of 5
     uv_from_set: array<vec4<f32>, 10>, // two rows a texture; w of the first: by what areas grow
 }
 
@@ -74,9 +74,12 @@ struct GBuffer {          // what shading reads of a primary hit
 
 const MATERIAL_DOUBLE_SIDED: u32 = 4u; // both sides are drawn
 const MATERIAL_UNLIT: u32 = 8u;    // it shows its base colour, whatever the light
+const MATERIAL_REFRACTS: u32 = 16u; // the surface of a body that bends light, with PARAM_REFRACT; else thin walls
 const GBUFFER_READ: u32 = 1u;      // attributes are read
 const GBUFFER_WAITS: u32 = 62u;    // bits of textures that have still to be looked up, the first is that of texture 0
 const GBUFFER_COARSER: u32 = 64u;  // a coarser level of a texture was looked up
+const GBUFFER_REFRACTS: u32 = 128u; // light is bent at the hit
+const GBUFFER_BACK: u32 = 256u;    // it is seen from behind, against its normals
 const GBUFFER_FIRST: u32 = 1u;     // bit of texture 0 among GBUFFER_WAITS
 const BASE_COLOR: u32 = 0u;        // textures of a material, by number
 const NORMAL: u32 = 1u;            // its normal texture

@@ -26,7 +26,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var carried = vec3<f32>(0.0);
     if surface.leaf != NONE {
         let g = gbuffer[index];
-        let r = random2(pixel_of(index), params.stream, params.seed);
+        let r = points2(pixel_of(index), params.stream, params.seed);
         let angle = params.around.w * r.x;
         let c = cos(angle);
         let s = sin(angle);

@@ -1,5 +1,5 @@
-// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss; where that
-// leads below the surface, none. The throughput and by which density the direction was drawn are noted.
+// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss, which may
+// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the direction was drawn are noted.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
@@ -8,6 +8,9 @@
 #include "shade/light.wgsl"
 #include "shade/gloss.wgsl"
 #include "shade/cones.wgsl"
+
+// What stands for the density of directions through facets: no lamp's rays bring the same light.
+const UNSHARED: f32 = 1.0e30;
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -25,13 +28,23 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         let g = gbuffer[index];
         let s = gloss_of(g, -seen_rays[index].direction);
         if is_glossy(s) {
-            ray.direction = gloss_direction(s, random4(pixel_of(index), params.stream, params.seed));
-            density = density_of(s, ray.direction);
-            if density > 0.0 && dot(surface.normal, ray.direction) > 0.0 {
+            let drawn = gloss_direction(s, points4(pixel_of(index), params.stream, params.seed));
+            let is_through = drawn.w > 0.0;
+            ray.direction = drawn.xyz;
+            density = UNSHARED;
+            if !is_through {
+                density = density_of(s, ray.direction);
+            }
+            if density > 0.0 && (dot(surface.normal, ray.direction) > 0.0) != is_through {
                 ray.t_min = 0.0;
                 ray.t_max = T_INFINITE;
                 alpha = greatest_alpha(s);
-                carried = reflected(s, ray.direction) * (dot(g.normal, ray.direction) / (PI * density));
+                if is_through {
+                    carried = passed(s, ray.direction) * radiance_scale(s);
+                } else {
+                    carried = reflected(s, ray.direction) * (dot(g.normal, ray.direction) / (PI * density));
+                }
+                carried *= left_within(g, seen_hits[index].t * length(seen_rays[index].direction));
             }
         }
     }

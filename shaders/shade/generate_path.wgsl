@@ -1,5 +1,5 @@
 // One ray from every hit of the shaded set, which a path goes on by, in a direction drawn by what the surface reflects:
-// around the normal by its diffuse part, else by its gloss. The throughput is what was carried so far times what is
+// around the normal by its diffuse part, else by its gloss, which may lead through it. The throughput is what was carried so far times what is
 // reflected, and the density by which the direction was drawn is noted. From the third ray on, paths that lose light
 // end by chance, and what goes on makes up for them (Russian roulette: Arvo, Kirk 1990). Then this set is moved to that
 // before it.
@@ -17,6 +17,8 @@
 const FIRST_CHANCE: u32 = 3u;
 // No path goes on for certain from there, so that all end.
 const MOST_LIKELY: f32 = 0.95;
+// What stands for the density of directions through facets: no lamp's rays bring the same light.
+const UNSHARED: f32 = 1.0e30;
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
@@ -34,12 +36,25 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if surface.leaf != NONE && max(before.x, max(before.y, before.z)) > 0.0 {
         let g = gbuffer[index];
         let s = gloss_of(g, -seen_rays[index].direction);
-        let words = random4(pixel_of(index) ^ pcg(u32(before.w) + 1u), params.stream, params.seed);
-        ray.direction = path_direction(s, g.normal, words);
-        density = path_density(s, g.normal, ray.direction);
-        if density > 0.0 && dot(surface.normal, ray.direction) > 0.0 {
-            let reflects = s.diffuse + reflected(s, ray.direction);
-            let weight = reflects * (dot(g.normal, ray.direction) / (PI * density));
+        let words = points4(pixel_of(index) ^ pcg(u32(before.w) + 1u), params.stream, params.seed);
+        let drawn = path_direction(s, g.normal, words);
+        let is_through = drawn.w > 0.0;
+        ray.direction = drawn.xyz;
+        density = UNSHARED;
+        if !is_through {
+            density = path_density(s, g.normal, ray.direction);
+        }
+        if density > 0.0 && (dot(surface.normal, ray.direction) > 0.0) != is_through {
+            var weight: vec3<f32>;
+            var scale = 1.0;
+            if is_through {
+                weight = passed(s, ray.direction) / path_choice(s);
+                scale = radiance_scale(s);
+            } else {
+                let reflects = s.diffuse + reflected(s, ray.direction);
+                weight = reflects * (dot(g.normal, ray.direction) / (PI * density));
+            }
+            weight *= left_within(g, seen_hits[index].t * length(seen_rays[index].direction));
             var chance = 1.0;
             if params.direction >= FIRST_CHANCE {
                 chance = min(max(weight.x, max(weight.y, weight.z)), MOST_LIKELY);
@@ -48,7 +63,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                 ray.t_min = 0.0;
                 ray.t_max = T_INFINITE;
                 alpha = select(1.0, greatest_alpha(s), is_glossy(s));
-                carried = before.rgb * weight / chance;
+                carried = before.rgb * (weight * (scale / chance));
             }
         }
     }

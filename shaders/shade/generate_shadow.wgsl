@@ -55,7 +55,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var ray = Ray(surface.point, 1.0, params.sun.xyz, 0.0);
     var chosen = Chosen(0u, 0.0);
     if surface.leaf != NONE {
-        let r = random2(pixel_of(index), params.stream, params.seed);
+        let r = points2(pixel_of(index), params.stream, params.seed);
         var faces = true;
         var t_max = T_INFINITE;
         if (params.flags & PARAM_EMITTER) != 0u {

@@ -1,7 +1,8 @@
 // How surfaces reflect otherwise than diffusely: microfacets with the distribution of Trowbridge and Reitz (GGX),
 // Smith's masking, Fresnel by Schlick, the light of further bounces between facets by Turquin (2019), and a clear coat
 // of the same kind on top. The diffuse part has what they leave of the light (the albedo scaling of
-// KHR_materials_specular), so that no energy is gained. Twin: src/kernels/shade/gloss.rs.
+// KHR_materials_specular), so that no energy is gained. Facets of bodies that refract let pass what they do not reflect
+// (Walter, Marschner, Li, Torrance 2007); the light of further bounces between them is lost. Twin: src/kernels/shade/gloss.rs.
 
 // Of a lobe's square root of roughness; smoother ones are as sharp as this.
 const LEAST_ALPHA: f32 = 0.001;
@@ -22,6 +23,8 @@ struct Gloss {
     share: vec3<f32>,     // of light from everywhere, reflected by the facets below the coat
     coat_share: f32,      // of light from everywhere, reflected by the coat
     choice: f32,          // probability that a direction is drawn by the coat
+    through: vec3<f32>,   // share of the light that facets do not reflect which enters the body, or leaves it
+    eta: f32,             // index of refraction on the side of the view over that beyond; 0 where nothing refracts
 }
 
 const LEAST_COS_VIEW: f32 = 1.0e-4;
@@ -55,14 +58,30 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
     s.alpha = max(g.roughness * g.roughness, LEAST_ALPHA);
     let around = reflectance(s.cos_view, s.alpha);
     let white = around.x + around.y;
-    let bounces = (1.0 - white) / white;
-    let of_dielectric = vec3<f32>(1.0) + m.specular * bounces;
+    var bounces = (1.0 - white) / white;
+    var specular = m.specular;
+    var inside = 0.0;
+    if (m.flags & MATERIAL_REFRACTS) != 0u {
+        if (g.state & GBUFFER_REFRACTS) != 0u {
+            let root = sqrt(m.specular.x);
+            let ior = (1.0 + root) / (1.0 - root);
+            s.eta = select(1.0 / ior, ior, (g.state & GBUFFER_BACK) != 0u);
+            inside = m.transmission;
+            bounces = 0.0;
+        } else {
+            // Rays that meet it stand for those as well that pass.
+            specular = min(specular / max(m.base_color.a, 1.0e-6), vec3<f32>(1.0));
+        }
+    }
+    let of_dielectric = vec3<f32>(1.0) + specular * bounces;
     let of_metal = vec3<f32>(1.0) + g.albedo * bounces;
-    s.f0 = mix(m.specular * of_dielectric, g.albedo * of_metal, g.metallic);
+    s.f0 = mix(specular * of_dielectric, g.albedo * of_metal, g.metallic);
     s.f90 = mix(m.specular_weight * of_dielectric, of_metal, g.metallic);
     s.share = s.f0 * around.x + s.f90 * around.y;
-    let left = vec3<f32>(1.0) - (m.specular * around.x + vec3<f32>(m.specular_weight * around.y)) * of_dielectric;
-    s.diffuse = g.albedo * (1.0 - g.metallic) * max(left, vec3<f32>(0.0));
+    let left = vec3<f32>(1.0) - (specular * around.x + vec3<f32>(m.specular_weight * around.y)) * of_dielectric;
+    let below_facets = g.albedo * (1.0 - g.metallic);
+    s.diffuse = below_facets * (1.0 - inside) * max(left, vec3<f32>(0.0));
+    s.through = below_facets * inside;
     s.coat = m.clearcoat;
     s.under = 1.0;
     if s.coat > 0.0 {
@@ -71,6 +90,7 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
         s.coat_share = s.coat * (COAT_F0 * of_coat.x + of_coat.y);
         s.under = 1.0 - s.coat_share;
         s.diffuse *= s.under;
+        s.through *= s.under;
     }
     let below = s.under * max(s.share.x, max(s.share.y, s.share.z));
     s.choice = s.coat_share / max(s.coat_share + below, 1.0e-20);
@@ -107,6 +127,34 @@ fn grazing(half_way: vec3<f32>, view: vec3<f32>) -> f32 {
     return c * c * c * c * c;
 }
 
+// Square of the cosine of the angle by which light goes on beyond a facet that it meets by this cosine; negative where
+// all of it is reflected.
+fn squared_beyond(s: Gloss, cosine: f32) -> f32 {
+    return 1.0 - s.eta * s.eta * (1.0 - cosine * cosine);
+}
+
+// What a facet reflects, by the cosine on the side that is not within the body (Schlick).
+fn fresnel(s: Gloss, half_way: vec3<f32>) -> vec3<f32> {
+    if s.eta <= 1.0 {
+        return mix(s.f0, s.f90, grazing(half_way, s.view));
+    }
+    let squared = squared_beyond(s, dot(half_way, s.view));
+    if squared <= 0.0 {
+        return vec3<f32>(1.0);
+    }
+    let c = clamp(1.0 - sqrt(squared), 0.0, 1.0);
+    return mix(s.f0, s.f90, c * c * c * c * c);
+}
+
+// Probability that a direction by a facet is one of reflection.
+fn reflects_by(s: Gloss, half_way: vec3<f32>) -> f32 {
+    if s.eta == 0.0 {
+        return 1.0;
+    }
+    let f = fresnel(s, half_way);
+    return max(f.x, max(f.y, f.z));
+}
+
 // What the surface reflects of light from d, a unit vector, otherwise than diffusely: pi times its distribution
 // function.
 fn reflected(s: Gloss, d: vec3<f32>) -> vec3<f32> {
@@ -114,9 +162,9 @@ fn reflected(s: Gloss, d: vec3<f32>) -> vec3<f32> {
         return vec3<f32>(0.0);
     }
     let half_way = normalize(s.view + d);
-    let f = grazing(half_way, s.view);
-    var sum = mix(s.f0, s.f90, f) * (s.under * lobe(s, s.alpha, d, half_way).x);
+    var sum = fresnel(s, half_way) * (s.under * lobe(s, s.alpha, d, half_way).x);
     if s.coat > 0.0 {
+        let f = grazing(half_way, s.view);
         sum += vec3<f32>(s.coat * mix(COAT_F0, 1.0, f) * lobe(s, s.coat_alpha, d, half_way).x);
     }
     return PI * sum;
@@ -128,7 +176,7 @@ fn density_of(s: Gloss, d: vec3<f32>) -> f32 {
         return 0.0;
     }
     let half_way = normalize(s.view + d);
-    var density = (1.0 - s.choice) * lobe(s, s.alpha, d, half_way).y;
+    var density = (1.0 - s.choice) * reflects_by(s, half_way) * lobe(s, s.alpha, d, half_way).y;
     if s.coat > 0.0 {
         density += s.choice * lobe(s, s.coat_alpha, d, half_way).y;
     }
@@ -159,9 +207,10 @@ fn reflected_by_diffuse_rays(s: Gloss) -> vec3<f32> {
 }
 
 // A direction drawn by the facets that are seen (Dupuy, Benyoub 2023, "Sampling visible GGX normals with spherical
-// caps"), a unit vector; it may lead below the surface.
-fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
-    let alpha = select(s.alpha, s.coat_alpha, unit(words.z) < s.choice);
+// caps"), a unit vector; it may lead below the surface. w: 1 where it leads through a facet, else it is reflected.
+fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec4<f32> {
+    let is_coat = unit(words.z) < s.choice;
+    let alpha = select(s.alpha, s.coat_alpha, is_coat);
     let x = tangent(s.normal);
     let y = cross(s.normal, x);
     let v = normalize(vec3<f32>(alpha * dot(s.view, x), alpha * dot(s.view, y), s.cos_view));
@@ -173,5 +222,46 @@ fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
     let h = vec3<f32>(level * cos(around), level * sin(around), height) + v;
     let facet = normalize(vec3<f32>(alpha * h.x, alpha * h.y, max(h.z, 0.0)));
     let half_way = facet.x * x + facet.y * y + facet.z * s.normal;
-    return normalize(2.0 * dot(s.view, half_way) * half_way - s.view);
+    let cosine = dot(s.view, half_way);
+    if s.eta > 0.0 && !is_coat && unit(pcg(words.z)) >= reflects_by(s, half_way) {
+        let beyond = sqrt(max(squared_beyond(s, cosine), 0.0));
+        return vec4<f32>(normalize((s.eta * cosine - beyond) * half_way - s.eta * s.view), 1.0);
+    }
+    return vec4<f32>(normalize(2.0 * cosine * half_way - s.view), 0.0);
+}
+
+// What light from d, a direction through a facet, brings over the density by which it was drawn: what the facet does
+// not reflect of it, and others do not mask. Radiance grows by the square of the index of refraction; that is left out.
+fn passed(s: Gloss, d: vec3<f32>) -> vec3<f32> {
+    let sum = d + s.eta * s.view;
+    // Of a body like what is around it every facet is one.
+    let across = select(sum, s.normal, dot(sum, sum) < 1.0e-12);
+    let half_way = normalize(select(across, -across, dot(across, s.view) < 0.0));
+    let reflects = fresnel(s, half_way);
+    let left = max(1.0 - max(reflects.x, max(reflects.y, reflects.z)), 1.0e-6);
+    let cosine = max(-dot(s.normal, d), 0.0);
+    let squared = s.alpha * s.alpha;
+    let unmasked = 2.0 * cosine / max(cosine + sqrt(squared + (1.0 - squared) * cosine * cosine), 1.0e-20);
+    return s.through * (vec3<f32>(1.0) - reflects) * (unmasked / (left * (1.0 - s.choice)));
+}
+
+// Share of the light that facets do not reflect which goes through them.
+fn through_facets(s: Gloss) -> vec3<f32> {
+    return s.through;
+}
+
+// By what radiance grows as it goes through a facet, seen against its way.
+fn radiance_scale(s: Gloss) -> f32 {
+    return s.eta * s.eta;
+}
+
+// What is left of light that went through the body whose back is hit, so far from where it started.
+fn left_within(g: GBuffer, way: f32) -> vec3<f32> {
+    let word = materials[g.material].absorption;
+    let within = GBUFFER_REFRACTS | GBUFFER_BACK;
+    if (g.state & within) != within || word == 0u {
+        return vec3<f32>(1.0);
+    }
+    let scale = exp2(f32(word >> 27u) - 24.0) * params.origin.w * way;
+    return exp(-scale * vec3<f32>(f32(word & 511u), f32((word >> 9u) & 511u), f32((word >> 18u) & 511u)));
 }

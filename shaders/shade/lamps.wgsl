@@ -32,7 +32,7 @@ fn lamp_words(index: u32, number: u32) -> vec4<u32> {
     if (params.flags & PARAM_BOUNCE) != 0u {
         pixel ^= pcg(u32(throughput[index].w) + 1u);
     }
-    return random4(pixel, params.stream, params.seed ^ (number * GOLDEN));
+    return points4(pixel, params.stream, params.seed ^ (number * GOLDEN));
 }
 
 // The angle of the point (x, y) from the x axis, -pi to pi: Abramowitz, Stegun, "Handbook of Mathematical Functions",

@@ -39,7 +39,8 @@ fn seen_emission(g: GBuffer, ray: Ray, index: u32, density: f32) -> vec3<f32> {
     if !is_lamp {
         return g.emission;
     }
-    if (params.flags & PARAM_EMISSION) == 0u {
+    let is_behind = (m.flags & MATERIAL_DOUBLE_SIDED) == 0u && (g.state & GBUFFER_BACK) != 0u;
+    if (params.flags & PARAM_EMISSION) == 0u || is_behind {
         return vec3<f32>(0.0);
     }
     if density > 0.0 && params.emitter_density > 0.0 {

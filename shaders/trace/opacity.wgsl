@@ -1,6 +1,6 @@
 // Which rays pass through a triangle: what the alpha of its material decides (glTF 2.0, section 3.9.4). MASK lets pass
 // where alpha is below the cutoff; BLEND where a number drawn for ray and triangle is not below alpha, so that the mean
-// over draws is what blending shows. Alpha is a function of the point on the triangle alone, so hits depend on no
+// over draws is what blending shows, and through a body that bends light no ray passes straight. Alpha is a function of the point on the triangle alone, so hits depend on no
 // order. Kernels of a scene without such triangles have a function in place of this file that says no.
 #include "common/random.wgsl"
 
@@ -84,6 +84,9 @@ fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) ->
     let p = opacity[2u * second.z];
     let q = opacity[2u * second.z + 1u];
     let m = Opacity(bitcast<f32>(p.x), bitcast<f32>(p.y), p.z, p.w, q.x, q.y, q.z, q.w);
+    if (m.blends & 2u) != 0u && (params.flags & PARAM_REFRACT) != 0u {
+        return false;
+    }
     let alphas = vec3<f32>(vec3<u32>(second.w, second.w >> 8u, second.w >> 16u) & vec3<u32>(255u));
     var alpha = barrier(m.factor * weighted_sum(weights, alphas.x, alphas.y, alphas.z));
     if m.texels == NONE {
@@ -95,7 +98,7 @@ fn passes(r: ptr<function, BrickRay>, triangle: u32, id: u32, h: TriangleHit) ->
         let v = weighted_sum(weights, uv.y, uv.w, last.y);
         alpha = barrier(alpha * opacity_lookup(m, u, v));
     }
-    if m.blends != 0u {
+    if (m.blends & 1u) != 0u {
         return alpha <= barrier(ALPHA_ONE * drawn((*r).ray, id));
     }
     // Half a unit, so that rounding takes nothing away from an alpha that equals the cutoff.

@@ -41,4 +41,9 @@ impl Effects {
     pub fn has_bounces(&self) -> bool {
         self.diffuse.is_some() || self.glossy
     }
+
+    /// Whether bodies that refract bend light: paths follow it out of them again.
+    pub fn refracts(&self) -> bool {
+        self.glossy && self.bounces > 1
+    }
 }

@@ -35,7 +35,7 @@ pub fn camera_view(
     let origin = frame.point(camera.position);
     let centre = basis.direction(f64::from(width) / 2.0, f64::from(height) / 2.0);
     let mut params = Params {
-        origin: [origin[0], origin[1], origin[2], 0.0],
+        origin: [origin[0], origin[1], origin[2], frame.unit as f32],
         base: vec4(basis.b, 0.0),
         step_x: vec4(basis.dx, 0.0),
         step_y: vec4(basis.dy, basis.dy.length() / centre.length()),
@@ -66,6 +66,7 @@ pub fn camera_view(
         scatter: false,
         lod: Lod::default(),
         glossy: effects.glossy,
+        refracts: effects.refracts(),
         shares: effects.environment && light.lamps.environment.is_some() && effects.diffuse.is_some(),
     };
     View { frame, params, directions }

@@ -195,8 +195,20 @@ fn reflected_by_diffuse_rays(s: Gloss) -> vec3<f32> {
 fn reflected_around(s: Gloss) -> vec3<f32> {
     return vec3<f32>(0.0);
 }
-fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
+fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec4<f32> {
+    return vec4<f32>(0.0);
+}
+fn through_facets(s: Gloss) -> vec3<f32> {
     return vec3<f32>(0.0);
+}
+fn passed(s: Gloss, d: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(0.0);
+}
+fn radiance_scale(s: Gloss) -> f32 {
+    return 1.0;
+}
+fn left_within(g: GBuffer, way: f32) -> vec3<f32> {
+    return vec3<f32>(1.0);
 }
 ";
 

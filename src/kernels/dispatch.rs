@@ -39,7 +39,8 @@ impl Directions {
                 | flag(lamp == Some(Lamp::Environment), layout::PARAM_ENVIRONMENT)
                 | flag(pass.set() == 2, layout::PARAM_BOUNCE)
                 | flag(matches!(pass, Pass::PathShadow(_)), layout::PARAM_PATH)
-                | flag(self.glossy, layout::PARAM_GLOSSY),
+                | flag(self.glossy, layout::PARAM_GLOSSY)
+                | flag(self.refracts, layout::PARAM_REFRACT),
             stream: params.sample.wrapping_add(stream << 24),
             length: self.occlusion_length,
             levels: self.lod.params(pass, params.sun_radius),

@@ -2,7 +2,7 @@
 //! throughout.
 
 use super::layout::{NONE, Opacity};
-use bricks::{BRICK_OPACITY, Error, MATERIAL_BLEND, Payload, Resident, SceneFile};
+use bricks::{BRICK_OPACITY, Error, MATERIAL_BLEND, MATERIAL_REFRACTS, Payload, Resident, SceneFile};
 
 /// Whether rays may pass through some triangle.
 pub fn is_needed(resident: &Resident) -> bool {
@@ -32,7 +32,8 @@ pub fn table(scene: &SceneFile) -> Result<Vec<[u32; 4]>, Error> {
         let record = Opacity {
             factor: material.base_color[3],
             cutoff: material.alpha_cutoff,
-            blends: u32::from(material.flags & MATERIAL_BLEND != 0),
+            blends: u32::from(material.flags & MATERIAL_BLEND != 0)
+                | u32::from(material.flags & MATERIAL_REFRACTS != 0) << 1,
             texels: map.map_or(NONE, |_| starts[material.opacity_map as usize]),
             width: map.map_or(1, |map| map.width),
             height: map.map_or(1, |map| map.height),

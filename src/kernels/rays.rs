@@ -1,6 +1,7 @@
 //! Rays of a set, with what is written of them.
 
 use super::layout::{Hit, NONE, Ray, Surface};
+use super::vector::dot;
 
 /// Rays, hits and surfaces of one set, row by row.
 #[derive(Default)]
@@ -21,6 +22,12 @@ impl RaySet {
             hits: vec![Hit::default(); rays],
             surfaces: vec![Surface::default(); rays],
         }
+    }
+
+    /// How far a ray went to its hit, device units.
+    pub fn way(&self, index: usize) -> f32 {
+        let d = self.rays[index].direction;
+        self.hits[index].t * dot(d, d).sqrt()
     }
 }
 

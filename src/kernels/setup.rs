@@ -102,6 +102,8 @@ pub struct Directions {
     pub scatter: bool,
     /// What surfaces reflect otherwise than diffusely comes by rays of its own, too.
     pub glossy: bool,
+    /// Bodies that refract bend light.
+    pub refracts: bool,
     /// Diffuse rays bring the environment's light as well as rays to it.
     pub shares: bool,
     /// What levels of detail are selected by.

@@ -72,6 +72,9 @@ pub fn uniform_hemisphere(square: [f32; 2]) -> [f32; 3] {
     [x * across, y * across, z]
 }
 
+/// The golden section of 2^32.
+pub const GOLDEN: u32 = 0x9e37_79b9;
+
 /// 32 random bits from 32: the output function of PCG on one step of its generator (O'Neill 2014; Jarzynski, Olano
 /// 2020). The kernels' `pcg` in `shaders/common/random.wgsl`.
 pub fn pcg(x: u32) -> u32 {
@@ -92,6 +95,41 @@ pub fn random4(pixel: u32, sample: u32, seed: u32) -> [u32; 4] {
     let b = pcg(a);
     let c = pcg(b);
     [a, b, c, pcg(c)]
+}
+
+/// Owen's scrambling of a word whose bits are reversed, by a hash (Laine, Karras 2011, with Vegdahl's constants).
+fn scrambled(word: u32, hash: u32) -> u32 {
+    let mut x = word;
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(hash);
+    x = x.wrapping_mul((hash >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^= x.wrapping_mul(0x53a2_2864);
+    x
+}
+
+/// Two words of a pixel's sample; see the kernels' `spread2`.
+fn spread2(index: u32, hash: u32) -> [u32; 2] {
+    let own = scrambled(index.reverse_bits(), hash).reverse_bits();
+    let masks = [0x5555_5555, 0x3333_3333, 0x0f0f_0f0f, 0x00ff_00ff, 0x0000_ffff];
+    let sums = (0..5).zip(masks).fold(own, |sums, (log2, mask)| sums ^ (sums >> (1 << log2) & mask));
+    let by_first = pcg(hash);
+    [scrambled(own, by_first).reverse_bits(), scrambled(sums, pcg(by_first)).reverse_bits()]
+}
+
+/// Four words for what a stream draws at a sample of a pixel, two points that its samples spread evenly each: the low
+/// 24 bits of `stream` are the sample, the others tell what is drawn. The kernels' `points4`, bit for bit.
+pub fn points4(pixel: u32, stream: u32, seed: u32) -> [u32; 4] {
+    let hash = pcg(pixel ^ pcg((stream >> 24) ^ pcg(seed)));
+    let sample = stream & 0x00ff_ffff;
+    let ([a, b], [c, d]) = (spread2(sample, hash), spread2(sample, pcg(hash ^ GOLDEN)));
+    [a, b, c, d]
+}
+
+/// Two numbers in [0, 1), of the first two words of [`points4`]: the kernels' `points2`.
+pub fn points2(pixel: u32, stream: u32, seed: u32) -> [f32; 2] {
+    let [a, b, ..] = points4(pixel, stream, seed);
+    [a, b].map(|x| (x >> 8) as f32 / 16_777_216.0)
 }
 
 /// Frames after which [`pixel_jitter`] repeats.
@@ -136,6 +174,47 @@ mod tests {
             }
         }
         worst
+    }
+
+    /// Of 2^n samples of a pixel, from a multiple of 2^n on, each elementary interval has one point in both pairs; random
+    /// ones leave some empty. Pixels, streams and seeds have points of their own.
+    #[test]
+    fn samples_of_a_pixel_are_spread_evenly() {
+        let points = |pixel, stream: u32, seed, count: u32| -> Vec<[u32; 4]> {
+            (0..count).map(|sample| points4(pixel, (stream << 24) + sample, seed)).collect()
+        };
+        let evenly = |points: &[[u32; 4]], [x, y]: [usize; 2]| {
+            let n = points.len().ilog2();
+            (0..=n).all(|wide| {
+                let cell = |p: &[u32; 4]| (u64::from(p[x]) >> (32 - wide), u64::from(p[y]) >> (32 - (n - wide)));
+                let mut cells: Vec<_> = points.iter().map(cell).collect();
+                cells.sort_unstable();
+                cells.dedup();
+                cells.len() == points.len()
+            })
+        };
+        for (pixel, stream, seed) in [(0, 0, 0), (7, 3, 1), (123_456, 80, u32::MAX)] {
+            let all = points(pixel, stream, seed, 256);
+            for range in [0..1, 0..4, 4..8, 0..16, 48..64, 0..64, 192..256, 0..256] {
+                let part = &all[range.clone()];
+                assert!(evenly(part, [0, 1]) && evenly(part, [2, 3]), "{pixel} {stream} {seed}: {range:?}");
+            }
+            let firsts = all.iter().map(|p| points2(pixel, (stream << 24) + (p[0] & 255), seed));
+            assert!(firsts.flatten().all(|x| (0.0..1.0).contains(&x)));
+            let random: Vec<_> = (0..16).map(|i| random4(pixel, i, seed)).collect();
+            assert!(!evenly(&random, [0, 1]), "the control must show");
+            for other in [points(pixel + 1, stream, seed, 256), points(pixel, stream ^ 1, seed, 256)] {
+                assert!(all.iter().zip(&other).filter(|(a, b)| a[0] >> 24 == b[0] >> 24).count() < 12);
+            }
+        }
+        // Nothing ties the two points of a sample, or those of two streams, to each other.
+        let (a, b) = (points(5, 1, 2, 1024), points(5, 2, 2, 1024));
+        let product = |x: u32, y: u32| (f64::from(x) / 2f64.powi(32) - 0.5) * (f64::from(y) / 2f64.powi(32) - 0.5);
+        for (i, j) in [(0, 2), (0, 3), (1, 2), (1, 3)] {
+            let within = a.iter().map(|p| product(p[i], p[j])).sum::<f64>() / 1024.0;
+            let between = a.iter().zip(&b).map(|(p, q)| product(p[i], q[j])).sum::<f64>() / 1024.0;
+            assert!(within.abs() < 0.012 && between.abs() < 0.012, "{i} {j}: {within} {between}");
+        }
     }
 
     #[test]

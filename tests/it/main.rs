@@ -68,6 +68,7 @@ mod scenes {
 /// Light, materials and filters of the picture against closed forms.
 mod shading {
     mod aov;
+    mod glass;
     mod gloss;
     mod instances;
     mod light;

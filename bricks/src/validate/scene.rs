@@ -10,7 +10,9 @@ use crate::records::{
     BRICK_WIDE, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, LIGHT_DISTANT, Leaf, MATERIAL_BLEND,
     MATERIAL_DOUBLE_SIDED,
 };
-use crate::records::{MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE};
+use crate::records::{
+    MATERIAL_MASK, MATERIAL_REFRACTS, MATERIAL_TEXTURES, MATERIAL_UNLIT, MAX_LATTICE_LOG2, MAX_TEXTURE_SIZE,
+};
 use crate::records::{
     MAX_TRIANGLE_IDS, Material, NONE, STEP_UNIT_LOG2, TEXTURE_BC5, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB,
 };
@@ -172,9 +174,16 @@ pub(super) fn leaves(resident: &Resident, section: Section, leaves: &[Leaf], lev
 pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
     for (index, material) in (0u32..).zip(&resident.materials) {
         let part = Part::Record(Section::Materials, index);
-        rule(material._reserved == 0, part, || ("reserved words", "zero in them"))?;
+        let refracts = material.flags & MATERIAL_REFRACTS != 0;
+        rule(refracts || material.absorption == 0, part, || {
+            (format!("absorption {:#x}", material.absorption), "zero where nothing refracts")
+        })?;
+        rule(!refracts || material.flags & MATERIAL_BLEND != 0 && material.specular[0] < 1.0, part, || {
+            let (flags, specular) = (material.flags, material.specular[0]);
+            (format!("flags {flags:#x}, specular {specular}"), "a body that refracts with BLEND, and specular below 1")
+        })?;
         let both = MATERIAL_MASK | MATERIAL_BLEND;
-        let known = both | MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT;
+        let known = both | MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT | MATERIAL_REFRACTS;
         rule(material.flags & !known == 0 && material.flags & both != both, part, || {
             (format!("flags {:#x}", material.flags), "known flags, not both MASK and BLEND")
         })?;

@@ -120,7 +120,7 @@ fn structs() -> BTreeMap<String, Table> {
             clearcoat_roughness,
             transmission,
             uv_sets,
-            _reserved,
+            absorption,
             uv_from_set
         }),
         table!(OpacityMap { width, height, wrap, _reserved, texels }),

@@ -93,8 +93,8 @@ fn leaves() {
 #[test]
 fn materials_and_textures() {
     use Section::{Bricks, Materials, OpacityMaps, Textures};
-    refused(record(Materials, 1), "reserved", |r| r.materials[1]._reserved = 1);
     refused(record(Materials, 1), "flags 0x10", |r| r.materials[1].flags = 16);
+    refused(record(Materials, 1), "flags 0x20", |r| r.materials[1].flags = 32);
     refused(record(Materials, 1), "flags 0x3", |r| r.materials[1].flags = MATERIAL_MASK | MATERIAL_BLEND);
     refused(record(Materials, 0), "texture 2", |r| r.materials[0].base_color_texture = 2);
     refused(record(Materials, 0), "NaN", |r| r.materials[0].base_color[3] = f32::NAN);

@@ -15,6 +15,26 @@ fn refused(section: Section, index: u32, found: &str, spoil: impl FnOnce(&mut Re
     assert!(flaw.found.contains(found), "{flaw} does not say {found}");
 }
 
+#[test]
+fn absorption_is_packed_to_a_five_hundredth_of_the_greatest() {
+    for (given, within) in [
+        ([0.0; 3], 0.0),
+        ([1.0, 0.5, 0.25], 0.0),
+        ([0.3, 0.7, 0.001], 0.7 / 511.0),
+        ([65_408.0, 1e9, f64::INFINITY], 128.0),
+        ([1e-7, 2e-7, 3e-7], 6e-8),
+        ([511.4, 0.0, 1.0], 0.5),
+        ([511.6, 0.0, 1.0], 1.0),
+    ] {
+        let found = unpack_absorption(pack_absorption(given));
+        for (found, given) in found.into_iter().zip(given) {
+            let held = given.min(65_408.0);
+            assert!((f64::from(found) - held).abs() <= within + 1e-12, "{found} for {given}");
+        }
+    }
+    assert_eq!(pack_absorption([f64::NAN, -1.0, 0.0]), 0);
+}
+
 /// A field from 0 to 1.
 type Share = fn(&mut Material) -> &mut f32;
 
@@ -50,6 +70,17 @@ fn materials() {
             validate::resident(&resident).unwrap();
         }
     }
+    // What refracts has an index of refraction and BLEND; nothing else absorbs.
+    material("absorption 0x1", |m| m.absorption = 1);
+    for flags in [MATERIAL_REFRACTS, MATERIAL_REFRACTS | MATERIAL_MASK] {
+        refused(Section::Materials, 1, "flags", |r| r.materials[1].flags = flags);
+    }
+    refused(Section::Materials, 1, "specular", |r| {
+        (r.materials[1].flags, r.materials[1].specular) = (MATERIAL_BLEND | MATERIAL_REFRACTS, [1.0; 3]);
+    });
+    let mut resident = written().2.resident;
+    (resident.materials[1].flags, resident.materials[1].absorption) = (MATERIAL_BLEND | MATERIAL_REFRACTS, 1);
+    validate::resident(&resident).unwrap();
     material("normal_scale: NaN", |m| m.normal_scale = f32::NAN);
     material("normal_scale: -inf", |m| m.normal_scale = f32::NEG_INFINITY);
     material("sets of texture coordinates 0x20", |m| m.uv_sets = 32);

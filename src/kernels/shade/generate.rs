@@ -3,7 +3,7 @@
 
 use super::choose::{Chosen, choose_direction, choose_emitter};
 use super::cones::{self, widen};
-use super::gloss::Gloss;
+use super::gloss::{Drawn, Gloss, left_within};
 use super::lamps::{environment_sample, lamp_words, shines};
 use super::random::{disc_point, tangent};
 use super::shade::Pixels;
@@ -15,7 +15,7 @@ use crate::kernels::layout::{
 use crate::kernels::rays::{RaySet, start_hit};
 use crate::kernels::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
 use crate::math::exact::barrier;
-use crate::math::sampling::{pcg, random2, random4};
+use crate::math::sampling::{pcg, points2, points4};
 use bricks::Material;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -114,7 +114,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
         let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
         let mut chosen = Chosen::default();
         if surface.leaf != NONE {
-            let r = random2(bound.pixel_of(index), p.stream, p.seed);
+            let r = points2(bound.pixel_of(index), p.stream, p.seed);
             let mut faces = true;
             let mut t_max = T_INFINITE;
             if bound.has(PARAM_EMITTER) {
@@ -154,7 +154,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
 fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
     let p = bound.params;
     let mut a = p.around;
-    let r = random2(bound.pixel_of(index), p.stream, p.seed);
+    let r = points2(bound.pixel_of(index), p.stream, p.seed);
     let angle = a[3] * r[0];
     let (c, s) = (angle.cos(), angle.sin());
     let x = tangent(normal);
@@ -176,6 +176,9 @@ pub fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
     let (t_min, t_max) = if above { (0.0, t_max) } else { (1.0, 0.0) };
     Ray { origin: surface.point, t_min, direction, t_max }
 }
+
+/// What stands for the density of directions through facets: no lamp's rays bring the same light.
+pub(super) const UNSHARED: f32 = 1.0e30;
 
 /// What stands for the ray of a pixel without a hit.
 pub(super) fn none(origin: Vec3) -> Ray {
@@ -221,8 +224,8 @@ pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: 
     });
 }
 
-/// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss; where that
-/// leads below the surface, none. The throughput and by which density the direction was drawn are noted.
+/// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss, which may
+/// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the direction was drawn are noted.
 pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
     let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
     let p = bound.params;
@@ -235,11 +238,13 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
         if !s.is_glossy() {
             return none(surface.point);
         }
-        let direction = s.direction(random4(bound.pixel_of(index), p.stream, p.seed));
-        if s.density(direction) > 0.0 {
-            leaving(surface, direction, T_INFINITE)
+        let Drawn { direction, is_through } = s.direction(points4(bound.pixel_of(index), p.stream, p.seed));
+        let leaves = (dot(surface.normal, direction) > 0.0) != is_through;
+        let ended = Ray { direction, ..none(surface.point) };
+        if leaves && (is_through || s.density(direction) > 0.0) {
+            Ray { t_min: 0.0, t_max: T_INFINITE, ..ended }
         } else {
-            Ray { direction, ..none(surface.point) }
+            ended
         }
     });
     let carried = throughput.par_iter_mut().zip(densities.par_iter_mut()).zip(own.surfaces.par_iter_mut());
@@ -247,11 +252,16 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
         (*carried, *density) = ([0.0; 4], 0.0);
         let ray = &own.rays[index];
         if ray.t_min <= ray.t_max {
-            let s = gloss(index);
-            *density = s.density(ray.direction);
-            let reflected = s.reflected(ray.direction);
-            let share = dot(gbuffer[index].normal, ray.direction) / (PI * *density);
-            (0..3).for_each(|k| carried[k] = reflected[k] * share);
+            let (s, g) = (gloss(index), &gbuffer[index]);
+            let left = left_within(bound, g, &materials[g.material as usize], seen.way(index));
+            let is_through = dot(seen.surfaces[index].normal, ray.direction) <= 0.0;
+            *density = if is_through { UNSHARED } else { s.density(ray.direction) };
+            let (light, share) = if is_through {
+                (s.passed(ray.direction), s.eta * s.eta)
+            } else {
+                (s.reflected(ray.direction), dot(g.normal, ray.direction) / (PI * *density))
+            };
+            (0..3).for_each(|k| carried[k] = light[k] * share * left[k]);
             widen(bound, surface, cones::reflected(*density, s.greatest_alpha()));
         }
     });

@@ -4,10 +4,14 @@ use super::lamps::unit;
 use super::light::ambient;
 use super::random::tangent;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{GBuffer, MATERIAL_UNLIT, PARAM_BOUNCE, PARAM_GLOSSY, REFLECTANCE_SIZE};
+use crate::kernels::layout::{
+    GBUFFER_BACK, GBUFFER_REFRACTS, GBuffer, MATERIAL_REFRACTS, MATERIAL_UNLIT, PARAM_BOUNCE, PARAM_GLOSSY,
+    REFLECTANCE_SIZE,
+};
 use crate::kernels::reflectance::REFLECTANCES;
-use crate::kernels::vector::{Vec3, cross, dot, each, mix, most, most3, normalize};
-use bricks::Material;
+use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, most3, normalize};
+use crate::math::sampling::pcg;
+use bricks::{Material, unpack_absorption};
 use std::f32::consts::{PI, TAU};
 
 /// Of a lobe's square root of roughness; smoother ones are as sharp as this.
@@ -43,6 +47,19 @@ pub struct Gloss {
     coat_share: f32,
     /// Probability that a direction is drawn by the coat.
     choice: f32,
+    /// Share of the light that facets do not reflect which enters the body, or leaves it.
+    pub through: Vec3,
+    /// Index of refraction on the side of the view over that beyond; 0 where nothing refracts.
+    pub eta: f32,
+}
+
+/// A direction that was drawn, a unit vector.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn {
+    /// It may lead below the surface.
+    pub direction: Vec3,
+    /// It leads through a facet; else it is reflected.
+    pub is_through: bool,
 }
 
 /// What a lobe with reflectances of (1, 0) and of (0, 1) along the normal and at grazing angles reflects of light from
@@ -72,14 +89,27 @@ impl Gloss {
         s.alpha = most(g.roughness * g.roughness, LEAST_ALPHA);
         let [along, grazing] = reflectance(s.cos_view, s.alpha);
         let white = along + grazing;
-        let bounces = (1.0 - white) / white;
-        let of_dielectric = m.specular.map(|c| 1.0 + c * bounces);
+        let (mut bounces, mut specular, mut inside) = ((1.0 - white) / white, m.specular, 0.0);
+        if m.flags & MATERIAL_REFRACTS != 0 {
+            if g.state & GBUFFER_REFRACTS != 0 {
+                let root = m.specular[0].sqrt();
+                let ior = (1.0 + root) / (1.0 - root);
+                s.eta = if g.state & GBUFFER_BACK != 0 { ior } else { 1.0 / ior };
+                (bounces, inside) = (0.0, m.transmission);
+            } else {
+                // Rays that meet it stand for those as well that pass.
+                specular = specular.map(|c| least(c / most(m.base_color[3], 1.0e-6), 1.0));
+            }
+        }
+        let of_dielectric = specular.map(|c| 1.0 + c * bounces);
         let of_metal = g.albedo.map(|c| 1.0 + c * bounces);
-        s.f0 = each(|k| mix(m.specular[k] * of_dielectric[k], g.albedo[k] * of_metal[k], g.metallic));
+        s.f0 = each(|k| mix(specular[k] * of_dielectric[k], g.albedo[k] * of_metal[k], g.metallic));
         s.f90 = each(|k| mix(m.specular_weight * of_dielectric[k], of_metal[k], g.metallic));
         s.share = each(|k| s.f0[k] * along + s.f90[k] * grazing);
-        let left = each(|k| 1.0 - (m.specular[k] * along + m.specular_weight * grazing) * of_dielectric[k]);
-        s.diffuse = each(|k| g.albedo[k] * (1.0 - g.metallic) * most(left[k], 0.0));
+        let left = each(|k| 1.0 - (specular[k] * along + m.specular_weight * grazing) * of_dielectric[k]);
+        let below_facets = g.albedo.map(|c| c * (1.0 - g.metallic));
+        s.diffuse = each(|k| below_facets[k] * (1.0 - inside) * most(left[k], 0.0));
+        s.through = below_facets.map(|c| c * inside);
         s.coat = m.clearcoat;
         s.under = 1.0;
         if s.coat > 0.0 {
@@ -88,6 +118,7 @@ impl Gloss {
             s.coat_share = s.coat * (COAT_F0 * of_coat[0] + of_coat[1]);
             s.under = 1.0 - s.coat_share;
             s.diffuse = s.diffuse.map(|c| c * s.under);
+            s.through = s.through.map(|c| c * s.under);
         }
         let below = s.under * most3(s.share);
         s.choice = s.coat_share / most(s.coat_share + below, 1.0e-20);
@@ -120,6 +151,36 @@ impl Gloss {
         [distribution * masked, 0.5 * distribution / (self.cos_view + by_view)]
     }
 
+    fn grazing(&self, half_way: Vec3) -> f32 {
+        let c = (1.0 - dot(half_way, self.view)).clamp(0.0, 1.0);
+        c * c * c * c * c
+    }
+
+    /// Square of the cosine of the angle by which light goes on beyond a facet that it meets by this cosine; negative
+    /// where all of it is reflected.
+    fn squared_beyond(&self, cosine: f32) -> f32 {
+        1.0 - self.eta * self.eta * (1.0 - cosine * cosine)
+    }
+
+    /// What a facet reflects, by the cosine on the side that is not within the body (Schlick).
+    fn fresnel(&self, half_way: Vec3) -> Vec3 {
+        let by = |f: f32| each(|k| mix(self.f0[k], self.f90[k], f));
+        if self.eta <= 1.0 {
+            return by(self.grazing(half_way));
+        }
+        let squared = self.squared_beyond(dot(half_way, self.view));
+        if squared <= 0.0 {
+            return [1.0; 3];
+        }
+        let c = (1.0 - squared.sqrt()).clamp(0.0, 1.0);
+        by(c * c * c * c * c)
+    }
+
+    /// Probability that a direction by a facet is one of reflection.
+    fn reflects_by(&self, half_way: Vec3) -> f32 {
+        if self.eta == 0.0 { 1.0 } else { most3(self.fresnel(half_way)) }
+    }
+
     fn half_way(&self, d: Vec3) -> Vec3 {
         normalize(each(|k| self.view[k] + d[k]))
     }
@@ -131,11 +192,10 @@ impl Gloss {
             return [0.0; 3];
         }
         let half_way = self.half_way(d);
-        let c = (1.0 - dot(half_way, self.view)).clamp(0.0, 1.0);
-        let f = c * c * c * c * c;
         let lobe = self.under * self.lobe(self.alpha, d, half_way)[0];
-        let mut sum = each(|k| mix(self.f0[k], self.f90[k], f) * lobe);
+        let mut sum = self.fresnel(half_way).map(|f| f * lobe);
         if self.coat > 0.0 {
+            let f = self.grazing(half_way);
             let of_coat = self.coat * mix(COAT_F0, 1.0, f) * self.lobe(self.coat_alpha, d, half_way)[0];
             sum = sum.map(|c| c + of_coat);
         }
@@ -148,7 +208,7 @@ impl Gloss {
             return 0.0;
         }
         let half_way = self.half_way(d);
-        let mut density = (1.0 - self.choice) * self.lobe(self.alpha, d, half_way)[1];
+        let mut density = (1.0 - self.choice) * self.reflects_by(half_way) * self.lobe(self.alpha, d, half_way)[1];
         if self.coat > 0.0 {
             density += self.choice * self.lobe(self.coat_alpha, d, half_way)[1];
         }
@@ -160,10 +220,10 @@ impl Gloss {
         self.share.map(|c| c * self.under + self.coat_share)
     }
 
-    /// Share of light of one radiance from everywhere that the surface reflects.
+    /// Share of light of one radiance from everywhere that the surface reflects, or lets through.
     pub fn albedo(&self) -> Vec3 {
         let around = self.around();
-        each(|k| self.diffuse[k] + around[k])
+        each(|k| self.diffuse[k] + around[k] + self.through[k])
     }
 
     /// What the surface reflects otherwise than diffusely of the background, unshadowed, where rays of its own do not
@@ -189,9 +249,10 @@ impl Gloss {
     }
 
     /// A direction drawn by the facets that are seen (Dupuy, Benyoub 2023, "Sampling visible GGX normals with spherical
-    /// caps"), a unit vector; it may lead below the surface.
-    pub fn direction(&self, words: [u32; 4]) -> Vec3 {
-        let alpha = if unit(words[2]) < self.choice { self.coat_alpha } else { self.alpha };
+    /// caps").
+    pub fn direction(&self, words: [u32; 4]) -> Drawn {
+        let is_coat = unit(words[2]) < self.choice;
+        let alpha = if is_coat { self.coat_alpha } else { self.alpha };
         let x = tangent(self.normal);
         let y = cross(self.normal, x);
         let v = normalize([alpha * dot(self.view, x), alpha * dot(self.view, y), self.cos_view]);
@@ -203,9 +264,42 @@ impl Gloss {
         let h = [level * around.cos() + v[0], level * around.sin() + v[1], height + v[2]];
         let facet = normalize([alpha * h[0], alpha * h[1], most(h[2], 0.0)]);
         let half_way = each(|k| facet[0] * x[k] + facet[1] * y[k] + facet[2] * self.normal[k]);
-        let along = 2.0 * dot(self.view, half_way);
-        normalize(each(|k| along * half_way[k] - self.view[k]))
+        let cosine = dot(self.view, half_way);
+        if self.eta > 0.0 && !is_coat && unit(pcg(words[2])) >= self.reflects_by(half_way) {
+            let along = self.eta * cosine - most(self.squared_beyond(cosine), 0.0).sqrt();
+            let direction = normalize(each(|k| along * half_way[k] - self.eta * self.view[k]));
+            return Drawn { direction, is_through: true };
+        }
+        let along = 2.0 * cosine;
+        Drawn { direction: normalize(each(|k| along * half_way[k] - self.view[k])), is_through: false }
     }
+
+    /// What light from d, a direction through a facet, brings over the density by which it was drawn: what the facet
+    /// does not reflect of it, and others do not mask. Radiance grows by the square of the index of refraction; that is
+    /// left out.
+    pub fn passed(&self, d: Vec3) -> Vec3 {
+        let sum: Vec3 = each(|k| d[k] + self.eta * self.view[k]);
+        // Of a body like what is around it every facet is one.
+        let across = if dot(sum, sum) < 1.0e-12 { self.normal } else { sum };
+        let half_way = normalize(if dot(across, self.view) < 0.0 { across.map(|x| -x) } else { across });
+        let reflects = self.fresnel(half_way);
+        let left = most(1.0 - most3(reflects), 1.0e-6);
+        let cosine = most(-dot(self.normal, d), 0.0);
+        let squared = self.alpha * self.alpha;
+        let root = (squared + (1.0 - squared) * cosine * cosine).sqrt();
+        let unmasked = 2.0 * cosine / most(cosine + root, 1.0e-20);
+        each(|k| self.through[k] * (1.0 - reflects[k]) * (unmasked / (left * (1.0 - self.choice))))
+    }
+}
+
+/// What is left of light that went through the body whose back is hit, so far from where it started, device units.
+pub fn left_within(bound: &Bound, g: &GBuffer, m: &Material, way: f32) -> Vec3 {
+    let within = GBUFFER_REFRACTS | GBUFFER_BACK;
+    if g.state & within != within || m.absorption == 0 {
+        return [1.0; 3];
+    }
+    let scale = bound.params.origin[3] * way;
+    unpack_absorption(m.absorption).map(|c| (-scale * c).exp())
 }
 
 #[cfg(test)]
@@ -287,7 +381,7 @@ mod tests {
                     let count = 200_000;
                     let (mut sum, mut below) = (0.0, 0);
                     for i in 0..count {
-                        let d = s.direction(random4(i, 1, 2));
+                        let d = s.direction(random4(i, 1, 2)).direction;
                         let density = s.density(d);
                         if density > 0.0 {
                             sum += f64::from(s.reflected(d)[0] * d[2] / (PI * density));
@@ -309,9 +403,46 @@ mod tests {
         let s = gloss(&material(0.04, 0.0, 0.6), 0.6, 0.6);
         let cap = |d: Vec3| d[2] > 0.8 && d[0] < 0.0;
         let count = 400_000;
-        let drawn = (0..count).filter(|&i| cap(s.direction(random4(i, 5, 9)))).count() as f64 / f64::from(count);
+        let drawn =
+            (0..count).filter(|&i| cap(s.direction(random4(i, 5, 9)).direction)).count() as f64 / f64::from(count);
         let expected = over_hemisphere(800, 800, |d, _| if cap(d) { f64::from(s.density(d)) } else { 0.0 });
         assert!((drawn - expected).abs() < 4e-3 && expected > 0.05, "{drawn} instead of {expected}");
+    }
+
+    /// What facets that refract reflect and let pass comes to all of it where they are smooth, from both sides, and to no
+    /// more where they are rough. Beyond the critical angle all is reflected.
+    #[test]
+    fn facets_that_refract_gain_nothing() {
+        let m = Material { transmission: 1.0, flags: MATERIAL_REFRACTS, ..material(0.04, 0.0, 0.0) };
+        for roughness in [0.0, 0.3, 0.7] {
+            for back in [0, GBUFFER_BACK] {
+                for cosine in [0.2, 0.5, 0.8, 0.95] {
+                    let view = [(1.0f32 - cosine * cosine).sqrt(), 0.0, cosine];
+                    let state = GBUFFER_REFRACTS | back;
+                    let g = GBuffer { albedo: [1.0; 3], normal: NORMAL, roughness, state, ..GBuffer::default() };
+                    let s = Gloss::of(&g, &m, view);
+                    let (count, mut sum, mut through) = (100_000, 0.0, 0);
+                    for i in 0..count {
+                        let drawn = s.direction(random4(i, 3, 4));
+                        let d = drawn.direction;
+                        if drawn.is_through {
+                            through += 1;
+                            sum += if d[2] < 0.0 { f64::from(s.passed(d)[0]) } else { 0.0 };
+                        } else if s.density(d) > 0.0 {
+                            sum += f64::from(s.reflected(d)[0] * d[2] / (PI * s.density(d)));
+                        }
+                    }
+                    let mean = sum / f64::from(count);
+                    // Facets turned away from the view as far as 0.7 lets them lose a third.
+                    let least = if roughness == 0.0 { 0.998 } else { 1.05 - f64::from(roughness) };
+                    assert!((least..1.002).contains(&mean), "{roughness} {back} {cosine}: {mean}");
+                    // The sine of the critical angle is 1 / 1.5.
+                    if roughness == 0.0 && back != 0 && cosine < 0.74 {
+                        assert_eq!(through, 0, "{cosine}");
+                    }
+                }
+            }
+        }
     }
 
     #[test]

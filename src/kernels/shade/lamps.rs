@@ -5,11 +5,8 @@ use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_KIND, EMITTER_SPOT, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter, PARAM_BOUNCE, Params,
 };
 use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, normalize};
-use crate::math::sampling::{pcg, random4};
+use crate::math::sampling::{GOLDEN, pcg, points4};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
-
-/// The golden section of 2^32.
-const GOLDEN: u32 = 0x9e37_79b9;
 
 /// The high word of a product.
 fn multiply_high(a: u32, b: u32) -> u32 {
@@ -28,7 +25,7 @@ pub fn lamp_words(bound: &Bound, index: usize, number: u32, throughput: &[[f32; 
     if bound.has(PARAM_BOUNCE) {
         pixel ^= pcg((throughput[index][3] as u32).wrapping_add(1));
     }
-    random4(pixel, bound.params.stream, bound.params.seed ^ number.wrapping_mul(GOLDEN))
+    points4(pixel, bound.params.stream, bound.params.seed ^ number.wrapping_mul(GOLDEN))
 }
 
 /// The angle of the point (x, y) from the x axis, -pi to pi: Abramowitz, Stegun, "Handbook of Mathematical Functions",

@@ -1,8 +1,8 @@
 //! How paths go on from a surface: twin of `shaders/shade/paths.wgsl` and `generate_path.wgsl`.
 
 use super::cones::{self, widen};
-use super::generate::{for_each_leaving, leaving, none};
-use super::gloss::Gloss;
+use super::generate::{UNSHARED, for_each_leaving, none};
+use super::gloss::{Drawn, Gloss, left_within};
 use super::lamps::unit;
 use super::random::tangent;
 use super::shade::Pixels;
@@ -10,7 +10,7 @@ use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Ray, T_INFINITE};
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, least, most, most3, normalize};
-use crate::math::sampling::{pcg, random4};
+use crate::math::sampling::{pcg, points4};
 use bricks::Material;
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
@@ -21,17 +21,19 @@ const FIRST_CHANCE: u32 = 3;
 const MOST_LIKELY: f32 = 0.95;
 
 impl Gloss {
-    /// Probability that a path goes on by the gloss: its share of what the surface reflects of light from everywhere.
+    /// Probability that a path goes on by the gloss: its share of what the surface reflects and lets through of light
+    /// from everywhere.
     fn path_choice(&self) -> f32 {
         if !self.is_glossy() {
             return 0.0;
         }
-        let (of_gloss, of_diffuse) = (most3(self.around()), most3(self.diffuse));
+        let of_gloss = most3(self.around()) + most3(self.through);
+        let of_diffuse = most3(self.diffuse);
         of_gloss / most(of_gloss + of_diffuse, 1.0e-20)
     }
 
-    /// A direction from a surface with this normal, a unit vector; it may lead below the surface.
-    fn path_direction(&self, normal: Vec3, words: [u32; 4]) -> Vec3 {
+    /// A direction from a surface with this normal.
+    fn path_direction(&self, normal: Vec3, words: [u32; 4]) -> Drawn {
         if unit(words[3]) < self.path_choice() {
             return self.direction(words);
         }
@@ -40,7 +42,8 @@ impl Gloss {
         let level = squared.sqrt();
         let (x, up) = (tangent(normal), (1.0 - squared).sqrt());
         let y = cross(normal, x);
-        normalize(each(|k| level * around.cos() * x[k] + level * around.sin() * y[k] + up * normal[k]))
+        let direction = normalize(each(|k| level * around.cos() * x[k] + level * around.sin() * y[k] + up * normal[k]));
+        Drawn { direction, is_through: false }
     }
 
     /// By which a path draws its direction d, a unit vector.
@@ -69,19 +72,30 @@ pub fn generate_path(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mu
         }
         let g = &gbuffer[index];
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
-        let words = random4(bound.pixel_of(index) ^ pcg((before[3] as u32).wrapping_add(1)), p.stream, p.seed);
-        let direction = s.path_direction(g.normal, words);
-        let density = s.path_density(g.normal, direction);
+        let words = points4(bound.pixel_of(index) ^ pcg((before[3] as u32).wrapping_add(1)), p.stream, p.seed);
+        let drawn = s.path_direction(g.normal, words);
+        let direction = drawn.direction;
+        let density = if drawn.is_through { UNSHARED } else { s.path_density(g.normal, direction) };
         let ended = Ray { direction, ..none(surface.point) };
         let mut step = Step { ray: ended, weight: [0.0; 3], density, alpha: 0.0 };
-        if density > 0.0 && dot(surface.normal, direction) > 0.0 {
-            let (reflected, share) = (s.reflected(direction), dot(g.normal, direction) / (PI * density));
-            let weight = each(|k| (s.diffuse[k] + reflected[k]) * share);
+        if density > 0.0 && (dot(surface.normal, direction) > 0.0) != drawn.is_through {
+            let (mut weight, mut scale);
+            if drawn.is_through {
+                weight = s.passed(direction).map(|c| c / s.path_choice());
+                scale = s.eta * s.eta;
+            } else {
+                let (reflected, share) = (s.reflected(direction), dot(g.normal, direction) / (PI * density));
+                weight = each(|k| (s.diffuse[k] + reflected[k]) * share);
+                scale = 1.0;
+            }
+            let left = left_within(bound, g, &materials[g.material as usize], seen.way(index));
+            weight = each(|k| weight[k] * left[k]);
             let chance = if p.direction >= FIRST_CHANCE { least(most3(weight), MOST_LIKELY) } else { 1.0 };
             if unit(pcg(words[3])) < chance {
-                step.ray = leaving(surface, direction, T_INFINITE);
+                scale /= chance;
+                step.ray = Ray { t_min: 0.0, t_max: T_INFINITE, ..ended };
                 step.alpha = if s.is_glossy() { s.greatest_alpha() } else { 1.0 };
-                step.weight = weight.map(|c| c / chance);
+                step.weight = weight.map(|c| c * scale);
             }
         }
         Some(step)

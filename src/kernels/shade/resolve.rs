@@ -3,13 +3,13 @@
 
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
-    GBUFFER_FIRST, GBUFFER_READ, GBuffer, INSTANCE_MIRRORED, INSTANCE_STRETCHED, NO_NORMAL, NONE, Params, Ray,
-    STATE_ATTRIBUTES, Surface,
+    GBUFFER_BACK, GBUFFER_FIRST, GBUFFER_READ, GBUFFER_REFRACTS, GBuffer, INSTANCE_MIRRORED, INSTANCE_STRETCHED,
+    MATERIAL_REFRACTS, NO_NORMAL, NONE, PARAM_REFRACT, Params, Ray, STATE_ATTRIBUTES, Surface,
 };
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
 use crate::kernels::texture::sample::settle;
-use crate::kernels::vector::{Vec3, dot, each, most, normalize, unpack4x8unorm, xyz};
+use crate::kernels::vector::{Vec3, dot, each, most, most3, normalize, unpack4x8unorm, xyz};
 use crate::math::exact::{divide, square_root};
 use bricks::{Material, NORMAL, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use rayon::prelude::*;
@@ -48,6 +48,13 @@ pub(crate) fn footprint_of(params: &Params, ray: &Ray, t: f32, surface: &Surface
     let cosine = most(divide(dot(ray.direction, surface.normal).abs(), length), LEAST_COSINE);
     let width = divide(distance * params.step_y[3], cosine);
     divide(uv_area, most(surface.area, 1.0e-30)) * (width * width)
+}
+
+/// Of the base colour of a body that rays pass straight through, what they meet shows: they meet it less often than
+/// light enters it, and by as much it is brighter.
+fn beside_passing(m: &Material) -> f32 {
+    let passing = m.transmission * (1.0 - m.metallic) * most3(xyz(m.base_color));
+    if passing < 1.0 { (1.0 - m.transmission) / (1.0 - passing) } else { 0.0 }
 }
 
 /// Of all hits of the shaded set that have none yet.
@@ -156,6 +163,17 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
     }
     if g.state == GBUFFER_READ {
         settle(&mut g, material.flags);
+    }
+    if is_turned {
+        g.state |= GBUFFER_BACK;
+    }
+    if material.flags & MATERIAL_REFRACTS != 0 {
+        if bound.has(PARAM_REFRACT) {
+            g.state |= GBUFFER_REFRACTS;
+        } else {
+            let share = beside_passing(material);
+            g.albedo = g.albedo.map(|c| c * share);
+        }
     }
     g
 }

@@ -8,9 +8,9 @@ use super::lamps::{
 use super::light::{add_light as add, ambient, background, sunlight};
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
-    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT, MET, NONE,
-    PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_PATH, PARAM_SKY,
-    PARAM_SUN, Ray,
+    BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBUFFER_BACK, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT,
+    MET, NONE, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_PATH,
+    PARAM_SKY, PARAM_SUN, Ray,
 };
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, most, normalize, xyz};
@@ -123,12 +123,13 @@ fn seen_emission(bound: &Bound, g: &GBuffer, m: &Material, seen: &RaySet, index:
     if !is_lamp {
         return g.emission;
     }
-    if !bound.has(PARAM_EMISSION) {
+    let is_behind = m.flags & MATERIAL_DOUBLE_SIDED == 0 && g.state & GBUFFER_BACK != 0;
+    if !bound.has(PARAM_EMISSION) || is_behind {
         return [0.0; 3];
     }
     if density > 0.0 && bound.params.emitter_density > 0.0 {
         let d = seen.rays[index].direction;
-        let length = seen.hits[index].t * dot(d, d).sqrt();
+        let length = seen.way(index);
         let cosine = most(dot(normalize(d), seen.surfaces[index].normal).abs(), 1.0e-6);
         let sides = if m.flags & MATERIAL_DOUBLE_SIDED != 0 { 2.0 } else { 1.0 };
         let luminance = dot(m.emission, [0.2126, 0.7152, 0.0722]);

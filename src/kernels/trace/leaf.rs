@@ -3,7 +3,7 @@
 
 use super::node::{FramedRay, UNIT, framed_ray};
 use crate::kernels::bound::{Bound, Scene};
-use crate::kernels::layout::{Entry, INSTANCE_IDENTITY};
+use crate::kernels::layout::{Entry, INSTANCE_IDENTITY, PARAM_REFRACT, Params};
 use crate::kernels::payloads::BrickView;
 use crate::kernels::simd::isa::Lanes;
 use crate::kernels::vector::{Vec3, each, least, most, most3};
@@ -16,6 +16,8 @@ pub struct Draw {
     pub seed: u32,
     /// `Params.stream`.
     pub stream: u32,
+    /// Bodies that refract stop all rays.
+    pub refracts: bool,
 }
 
 /// A ray in a brick.
@@ -83,7 +85,8 @@ impl<'a> BrickRay<'a> {
     #[inline(always)]
     pub fn enter_brick(&mut self, bound: &Bound<'a>, brick: usize) {
         self.brick = bound.bricks[brick];
-        self.draw = Draw { seed: bound.params.seed, stream: bound.params.stream };
+        let Params { seed, stream, .. } = *bound.params;
+        self.draw = Draw { seed, stream, refracts: bound.has(PARAM_REFRACT) };
         self.hidden = &bound.scene.hidden;
     }
 

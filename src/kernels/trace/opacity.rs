@@ -77,6 +77,9 @@ impl BrickRay<'_> {
         let weights = [divide(h.u, h.det), divide(h.v, h.det), divide(h.w, h.det)];
         let at = 2 * opacity.material as usize;
         let m: Opacity = bytemuck::cast([view.table[at], view.table[at + 1]]);
+        if m.blends & 2 != 0 && self.draw.refracts {
+            return false;
+        }
         let alphas = [0, 8, 16].map(|shift| (opacity.alphas >> shift & 255) as f32);
         let mut alpha = barrier(m.factor * weighted_sum(weights, alphas));
         if m.texels == NONE {
@@ -85,7 +88,7 @@ impl BrickRay<'_> {
             let [u, v] = [0, 1].map(|k| weighted_sum(weights, opacity.uv.map(|uv| uv[k])));
             alpha = barrier(alpha * view.lookup(&m, u, v));
         }
-        if m.blends != 0 {
+        if m.blends & 1 != 0 {
             return alpha <= barrier(ALPHA_ONE * drawn(self.draw, &self.ray, id));
         }
         barrier(alpha + 0.5) < barrier(ALPHA_ONE * m.cutoff)

@@ -280,9 +280,10 @@ impl Lockstep {
         let traced = |i: &usize| rays[*i].t_min <= rays[*i].t_max;
         let of_traced = |all: &[Hit]| -> Vec<Hit> { (0..all.len()).filter(traced).map(|i| all[i]).collect() };
         findings.words("hits", context, &of_traced(&hits.0), &of_traced(&hits.1));
-        // By what probability a direction was drawn follows from directions, which are near to equal.
+        // By what probability a direction was drawn follows from directions, which are near to equal. It stands where
+        // a surface that is met would put its area; what methods answer meets none.
         let of_traced = |all: &[Surface]| -> (Vec<Surface>, Vec<f32>) {
-            let parts = |i: usize| match hits.0[i].id {
+            let parts = |i: usize| match all[i].leaf {
                 NONE => (Surface { area: 0.0, ..all[i] }, all[i].area),
                 _ => (all[i], 0.0),
             };

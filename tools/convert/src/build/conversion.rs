@@ -115,8 +115,8 @@ impl Conversion<'_> {
         let lattices = cuts::choose(plan, &outline.meshes, &cuts, settings, &mut warnings)?;
         let means = textures.material_means();
         let opacity = opacities.of_materials(&textures.materials);
-        let details = textures.details();
-        let contexts = jobs::contexts(&lattices, &means, &opacity, &details, settings);
+        let wants = textures.wants();
+        let contexts = jobs::contexts(&lattices, &means, &opacity, &wants, settings);
         let jobs = jobs::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
         progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.len(), BATCH_TRIANGLES);
@@ -151,7 +151,7 @@ impl Conversion<'_> {
         let (means, opacity) = (textures.material_means(), opacities.of_materials(&textures.materials));
         let flattened = Flattened::of(textures, (&means, &opacity), used);
         let settings = BuildSettings { proxies: false, ..self.settings.clone() };
-        let contexts = jobs::contexts(lattices, &flattened.means, &flattened.opacity, &flattened.details, &settings);
+        let contexts = jobs::contexts(lattices, &flattened.means, &flattened.opacity, &flattened.wants, &settings);
         let instances = assemble::instance_records(&self.plan);
         let plan = levels::Plan::of(&levels::Scene {
             objects: &assemble::object_records(&self.plan, lattices, bricks),
@@ -300,12 +300,12 @@ impl Conversion<'_> {
         let lattices = cuts::choose(plan, &outline.meshes, &cuts.objects, settings, &mut warnings)?;
         let means = textures.material_means();
         let opacity = opacities.of_materials(&textures.materials);
-        let details = textures.details();
-        let contexts = jobs::contexts(&lattices, &means, &opacity, &details, settings);
+        let wants = textures.wants();
+        let contexts = jobs::contexts(&lattices, &means, &opacity, &wants, settings);
         let jobs = jobs::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
         let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.objects.len(), budget.batch);
         let by_disk = (&cuts, jobs.as_slice(), contexts.as_slice());
-        let rounded_away = if details.contains(&true) {
+        let rounded_away = if wants.iter().any(|wants| wants.details) {
             write_bricks::<Detailed>(&bounded, by_disk, &mut bricks, journal, clock)?
         } else {
             write_bricks::<Plain>(&bounded, by_disk, &mut bricks, journal, clock)?
@@ -415,8 +415,8 @@ fn encode_loaded(
         // All parts in use were read.
         let Some(primitive) = reader.loaded(part) else { continue };
         let placed = Placed { part, primitive };
-        let with_detail = context.details[primitive.material as usize];
-        let round = |slot: &u32| Triangle::round(&placed, slot - part.first_slot, &context.lattice, 0, with_detail);
+        let wants = context.wants[primitive.material as usize];
+        let round = |slot: &u32| Triangle::round(&placed, slot - part.first_slot, &context.lattice, 0, wants);
         triangles.extend(own.iter().filter_map(round));
     }
     let dropped = (slots.len() - triangles.len()) as u32;

@@ -167,12 +167,12 @@ impl Bounded<'_> {
         for piece in &run.pieces {
             let primitive = self.reader.get(piece)?;
             let placed = Placed { part: piece.part, primitive: &primitive };
-            let with_detail = context.details[primitive.material as usize];
+            let wants = context.wants[primitive.material as usize];
             for (triangle, &brick) in (piece.first..piece.end).zip(&mut slots) {
                 if brick == NONE {
                     continue;
                 }
-                match Triangle::round(&placed, triangle, &context.lattice, brick, with_detail) {
+                match Triangle::round(&placed, triangle, &context.lattice, brick, wants) {
                     Some(triangle) => pending[chunk_of[brick as usize] as usize].push(T::of(&triangle)),
                     None => dropped += 1,
                 }

@@ -5,7 +5,7 @@ use crate::build::texture::opacity::MaterialOpacity;
 use crate::build::tree::binary::{BinaryTree, Box3};
 use crate::build::tree::node;
 use crate::build::tree::wide::{WideTree, collapse, collapse_levels};
-use crate::build::triangles::attributes::{self, MeanColors, VertexBits};
+use crate::build::triangles::attributes::{self, MeanColors, VertexBits, Wants};
 use crate::build::triangles::intern::Interner;
 use crate::build::triangles::lattice::{Lattice, pow2};
 use crate::build::triangles::triangle::Triangle as Rounded;
@@ -30,8 +30,8 @@ pub(crate) struct BrickContext<'a> {
     pub materials: &'a [MeanColors],
     /// Opacity by material.
     pub opacity: &'a [MaterialOpacity],
-    /// Whether triangles need details, by material.
-    pub details: &'a [bool],
+    /// What triangles want, by material.
+    pub wants: &'a [Wants],
     /// Whether trees are built fast rather than well.
     pub is_fast: bool,
     /// Whether bricks have proxies.
@@ -186,7 +186,8 @@ fn lay_out(context: &BrickContext, contents: &Contents) -> EncodedBrick {
     };
     let opacity_of: Vec<u32> = tree.items.iter().map(opacity).map(number).collect();
     let flag = |set: bool, flag: u32| if set { flag } else { 0 };
-    let details = triangles.iter().any(|triangle| context.details[(triangle.surface & SURFACE_MATERIAL) as usize]);
+    let wants = |surface: u32| context.wants[(surface & SURFACE_MATERIAL) as usize];
+    let details = triangles.iter().any(|triangle| wants(triangle.surface).details);
     let kind = flag(wide, BRICK_WIDE) | flag(index32, BRICK_INDEX32) | flag(details, BRICK_DETAIL);
     let record = Brick {
         object: context.index,

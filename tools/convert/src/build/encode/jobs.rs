@@ -4,7 +4,7 @@ use super::brick::{BrickContext, EncodedBrick};
 use crate::build::error::BuildError;
 use crate::build::settings::BuildSettings;
 use crate::build::texture::opacity::MaterialOpacity;
-use crate::build::triangles::attributes::MeanColors;
+use crate::build::triangles::attributes::{MeanColors, Wants};
 use crate::build::triangles::lattice::Lattice;
 use crate::progress::Progress;
 use bricks::{Brick, Occupancy, Span, Writer};
@@ -127,11 +127,10 @@ pub(crate) fn contexts<'a>(
     lattices: &[Lattice],
     materials: &'a [MeanColors],
     opacity: &'a [MaterialOpacity],
-    details: &'a [bool],
+    wants: &'a [Wants],
     settings: &BuildSettings,
 ) -> Vec<BrickContext<'a>> {
     let (is_fast, has_proxies) = (settings.fast, settings.proxies);
-    let context =
-        |(index, &lattice)| BrickContext { index, lattice, materials, opacity, details, is_fast, has_proxies };
+    let context = |(index, &lattice)| BrickContext { index, lattice, materials, opacity, wants, is_fast, has_proxies };
     (0u32..).zip(lattices).map(context).collect()
 }

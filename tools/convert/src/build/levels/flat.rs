@@ -4,7 +4,7 @@ use super::merge::Shade;
 use crate::build::texture::mips::Textures;
 use crate::build::texture::opacity::MaterialOpacity;
 use crate::build::texture::small::Small;
-use crate::build::triangles::attributes::MeanColors;
+use crate::build::triangles::attributes::{MeanColors, Wants};
 use bricks::{BASE_COLOR, MATERIAL_BLEND, MATERIAL_MASK, Material, NONE};
 
 /// Where a texture is looked up under a triangle, as weights of its corners.
@@ -22,8 +22,8 @@ pub(crate) struct Flattened<'a> {
     pub means: Vec<MeanColors>,
     /// Opacity of all.
     pub opacity: Vec<MaterialOpacity>,
-    /// That none needs details.
-    pub details: Vec<bool>,
+    /// What triangles of each want: nothing.
+    pub wants: Vec<Wants>,
     /// The family of each.
     pub family_of: Vec<u32>,
     /// What levels take in place of a material of the scene, by its index.
@@ -124,7 +124,7 @@ impl<'a> Flattened<'a> {
             added: Vec::new(),
             means: means.to_vec(),
             opacity: opacity.to_vec(),
-            details: vec![false; materials.len()],
+            wants: vec![Wants::default(); materials.len()],
             family_of: (0..materials.len() as u32).collect(),
             families: Vec::with_capacity(materials.len()),
             looks: materials.iter().zip(means).map(look).collect(),
@@ -161,7 +161,7 @@ impl<'a> Flattened<'a> {
     fn add(&mut self, family: u32, material: Material) -> u32 {
         self.means.push(MeanColors::of(&material, &[]));
         self.opacity.push(MaterialOpacity::OPAQUE);
-        self.details.push(false);
+        self.wants.push(Wants::default());
         self.family_of.push(family);
         self.added.push(material);
         self.means.len() as u32 - 1

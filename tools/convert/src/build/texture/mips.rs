@@ -5,7 +5,7 @@ use super::small::{SMALL_TEXELS, Small};
 use crate::build::disk::journal::{WordReader, Words};
 use crate::build::error::BuildError;
 use crate::build::settings::TextureEncoding;
-use crate::build::triangles::attributes::MeanColors;
+use crate::build::triangles::attributes::{MeanColors, Wants};
 use crate::progress::Progress;
 use crate::source::{Outline, Source, SourceTexture};
 use block_compression::encode::compress_rgba8;
@@ -167,9 +167,9 @@ impl Textures {
         self.new_of_old[place(texture, Content::Color)] != NONE
     }
 
-    /// Whether triangles need details, by material.
-    pub fn details(&self) -> Vec<bool> {
-        self.materials.iter().map(Material::needs_details).collect()
+    /// What triangles want, by material.
+    pub fn wants(&self) -> Vec<Wants> {
+        self.materials.iter().map(Wants::of).collect()
     }
 
     /// Mean linear RGB of the textures.

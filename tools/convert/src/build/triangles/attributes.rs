@@ -2,7 +2,8 @@
 
 use super::intern::{Key, mix};
 use crate::build::input::objects::Placed;
-use bricks::{AttributeDetail, AttributeVertex, Material, NO_NORMAL, NONE};
+use crate::source::shines_to_front;
+use bricks::{AttributeDetail, AttributeVertex, MATERIAL_REFRACTS, Material, NO_NORMAL, NONE};
 
 /// [`AttributeVertex`] as bits.
 pub(super) type PlainBits = [u32; 4];
@@ -12,6 +13,23 @@ pub(super) type DetailBits = [u32; 4];
 
 /// The details of a vertex whose material needs none.
 pub(crate) const NO_DETAIL: DetailBits = [NO_NORMAL, 0, 0, 0];
+
+/// What triangles of a material want beside what all have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Wants {
+    /// Details.
+    pub details: bool,
+    /// Normals, of the triangles themselves where vertices have none: they tell front from back.
+    pub normals: bool,
+}
+
+impl Wants {
+    /// Those of a material.
+    pub fn of(material: &Material) -> Self {
+        let normals = material.flags & MATERIAL_REFRACTS != 0 || shines_to_front(material);
+        Self { details: material.needs_details(), normals }
+    }
+}
 
 /// An attribute vertex with its details, for interning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,14 +67,15 @@ impl VertexBits {
 }
 
 /// The attributes of vertex `vertex` of a placed part, which is corner `corner` (of all triangles of the part one after
-/// the other); `with_detail` if its material needs details.
-pub(crate) fn vertex(placed: &Placed, vertex: u32, corner: usize, with_detail: bool) -> VertexBits {
+/// the other). `outside`: twice the area vector of its triangle.
+pub(crate) fn vertex(placed: &Placed, vertex: u32, corner: usize, wants: Wants, outside: [f64; 3]) -> VertexBits {
     let primitive = placed.primitive;
-    let normal = source_normal(placed, vertex).unwrap_or(NO_NORMAL);
+    let of_triangle = || if wants.normals { octahedral(outside) } else { None };
+    let normal = source_normal(placed, vertex).or_else(of_triangle).unwrap_or(NO_NORMAL);
     let [u, v] = coordinates(primitive.uvs.as_deref(), vertex);
     let color = primitive.colors.as_ref().map_or(u32::MAX, |colors| unorm8(colors[vertex as usize]));
     let mut detail = NO_DETAIL;
-    if with_detail {
+    if wants.details {
         [detail[2], detail[3]] = coordinates(primitive.uvs1.as_deref(), vertex);
         if let Some((tangent, handedness)) = source_tangent(placed, corner) {
             [detail[0], detail[1]] = [tangent, handedness.to_bits()];

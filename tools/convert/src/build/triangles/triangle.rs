@@ -1,6 +1,6 @@
 //! A triangle on the lattice of its object, with all that a brick stores of it.
 
-use super::attributes::{self, NO_DETAIL, PlainBits, VertexBits};
+use super::attributes::{self, NO_DETAIL, PlainBits, VertexBits, Wants};
 use super::lattice::Lattice;
 use crate::build::input::objects::Placed;
 use bytemuck::{Pod, Zeroable};
@@ -21,16 +21,19 @@ pub(crate) struct Triangle {
 }
 
 impl Triangle {
-    /// Rounds a triangle of a part; `None` if that leaves it without area. `with_detail` if its material needs details.
-    pub fn round(placed: &Placed, triangle: u32, lattice: &Lattice, brick: u32, with_detail: bool) -> Option<Self> {
+    /// Rounds a triangle of a part; `None` if that leaves it without area. `wants`: what its material does.
+    pub fn round(placed: &Placed, triangle: u32, lattice: &Lattice, brick: u32, wants: Wants) -> Option<Self> {
         let source = placed.vertices(triangle);
         let corners = source.map(|vertex| lattice.round(placed.position(vertex)));
         if attributes::is_degenerate(&corners) {
             return None;
         }
         let first = triangle as usize * 3;
+        // A mirror turns the order of corners about.
+        let is_mirrored = placed.part.baking.as_ref().is_some_and(|baking| baking.matrix.determinant() < 0.0);
+        let outside = attributes::cross(&corners).map(|x| if is_mirrored { -x } else { x });
         let attributes =
-            std::array::from_fn(|corner| attributes::vertex(placed, source[corner], first + corner, with_detail));
+            std::array::from_fn(|corner| attributes::vertex(placed, source[corner], first + corner, wants, outside));
         Some(Self {
             brick,
             id: placed.part.first_id + triangle,

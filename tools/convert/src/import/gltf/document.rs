@@ -339,6 +339,8 @@ pub(super) struct MaterialExtensions {
     pub clearcoat: Option<Clearcoat>,
     #[serde(rename = "KHR_materials_transmission")]
     pub transmission: Option<Transmission>,
+    #[serde(rename = "KHR_materials_volume")]
+    pub volume: Option<Volume>,
     #[serde(rename = "KHR_materials_pbrSpecularGlossiness")]
     pub specular_glossiness: Option<SpecularGlossiness>,
 }
@@ -420,6 +422,12 @@ optional! {
     Transmission {
         transmission_factor: f64,
         transmission_texture: IgnoredAny,
+    }
+    /// KHR_materials_volume.
+    Volume {
+        thickness_factor: f64,
+        attenuation_distance: f64,
+        attenuation_color: [f64; 3],
     }
     /// KHR_materials_pbrSpecularGlossiness.
     SpecularGlossiness {

@@ -1,14 +1,16 @@
 //! Materials and their textures (glTF 2.0, sections 3.8 and 3.9, and the extensions KHR_materials_clearcoat,
-//! _emissive_strength, _ior, _pbrSpecularGlossiness, _specular, _transmission, _unlit and KHR_texture_transform).
+//! _emissive_strength, _ior, _pbrSpecularGlossiness, _specular, _transmission, _unlit, _volume and
+//! KHR_texture_transform).
 //!
 //! Filters of samplers are not kept: textures are averaged over what a pixel covers, whatever the sampler asks for.
 
-use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform};
+use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform, Volume};
 use super::file::{File, Problem, item};
 use super::names::label;
 use crate::import::warnings::Warnings;
 use bricks::{
-    MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_TEXTURES, MATERIAL_UNLIT, Material, NORMAL,
+    MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_REFRACTS, MATERIAL_TEXTURES, MATERIAL_UNLIT,
+    Material, NORMAL, pack_absorption,
 };
 use bricks::{WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT};
 use gltf::json::material::AlphaMode;
@@ -19,6 +21,9 @@ use std::collections::BTreeMap;
 
 /// Sets of texture coordinates that are read.
 const SETS: u32 = 2;
+
+/// Greatest index of refraction of a body; what none has.
+const MOST_INDEX: f64 = 100.0;
 
 /// An image with the way it is repeated.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -242,6 +247,9 @@ fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &d
 /// by the share a, is made brighter so that along the normal it is as bright as it was: specular / a, and of the base
 /// colour the share that is not transmitted, (1 - t) / (1 - t c). Then surfaces reflect and transmit no more than they
 /// receive. What is lost is the tint of what is seen through.
+///
+/// Of a body (KHR_materials_volume with a thickness) alpha is the same, but colours are left as they are: where paths
+/// follow light through it they are needed so, and else shading does what is said above.
 fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
     let Some(extension) = &json.more.extensions.transmission else { return };
     let transmission = unit(extension.transmission_factor.unwrap_or(0.0));
@@ -259,7 +267,8 @@ fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place
         warnings.add("transmission textures ignored; factor used", place);
     }
     let [r, g, b, _] = material.base_color;
-    if r != g || g != b {
+    let body = json.more.extensions.volume.as_ref().filter(|volume| volume.thickness_factor.is_some_and(|x| x > 0.0));
+    if body.is_none() && (r != g || g != b) {
         warnings.add("transmitted light is not tinted", place);
     }
     let passing = transmission * (1.0 - material.metallic) * r.max(g).max(b);
@@ -272,11 +281,36 @@ fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place
         material.base_color[3] = 1.0;
         material.flags |= MATERIAL_BLEND;
     }
+    if let Some(volume) = body {
+        if material.base_color[3] < 1.0 {
+            warnings.add("alpha ignored of a body that refracts", place);
+        }
+        material.base_color[3] = alpha;
+        refract(volume, json, material, warnings, place);
+        return;
+    }
     material.base_color[..3].iter_mut().for_each(|c| *c *= rest);
     material.base_color[3] *= alpha;
     if alpha > 0.0 {
         material.specular = material.specular.map(|c| (c / alpha).min(1.0));
     }
+}
+
+/// What a body that refracts is: its index of refraction and its absorption (KHR_materials_ior, _volume).
+fn refract(volume: &Volume, json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
+    let extensions = &json.more.extensions;
+    let index = extensions.ior.as_ref().and_then(|extension| extension.ior).unwrap_or(1.5).clamp(1.0, MOST_INDEX);
+    let along_normal = (((index - 1.0) / (index + 1.0)).powi(2)) as f32;
+    if material.specular != [along_normal; 3] || material.specular_weight != 1.0 {
+        warnings.add("KHR_materials_specular ignored of a body that refracts", place);
+        (material.specular, material.specular_weight) = ([along_normal; 3], 1.0);
+    }
+    if let Some(distance) = volume.attenuation_distance.filter(|distance| *distance > 0.0) {
+        let color = volume.attenuation_color.unwrap_or([1.0; 3]);
+        // Of what is black a thousandth is left, so that the packed absorptions of other colours keep their digits.
+        material.absorption = pack_absorption(color.map(|c| -c.clamp(1e-3, 1.0).ln() / distance));
+    }
+    material.flags |= MATERIAL_REFRACTS;
 }
 
 /// Images and wrap modes of a texture.

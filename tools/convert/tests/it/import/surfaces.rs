@@ -1,7 +1,9 @@
 //! Materials with all their textures, tangents, and lights.
 
 use super::writer::*;
-use bricks::{LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_BLEND, Material, NONE};
+use bricks::{
+    LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_BLEND, MATERIAL_REFRACTS, Material, NONE, unpack_absorption,
+};
 use brickwalk_convert::import::Input;
 use brickwalk_convert::source::{Primitive, SourceScene};
 use serde_json::{Value, json};
@@ -187,6 +189,39 @@ fn transmission_keeps_energy() {
     let (masked, warnings) = of(1.0, [1.0; 4], "MASK");
     assert!(warnings.len() == 1 && masked.transmission == 0.0 && masked.base_color == [1.0; 4]);
     assert_eq!(of(0.0, [1.0; 4], "OPAQUE").0.flags, 0);
+}
+
+#[test]
+fn bodies_refract_by_index_and_attenuation() {
+    let of = |volume: Value, more: Value| {
+        let mut extensions = json!({"KHR_materials_transmission": {"transmissionFactor": 0.75},
+            "KHR_materials_ior": {"ior": 2}, "KHR_materials_volume": volume});
+        for (name, extension) in more.as_object().unwrap() {
+            extensions[name] = extension.clone();
+        }
+        material(json!({
+            "pbrMetallicRoughness": {"baseColorFactor": [1, 0.5, 0.25, 1], "metallicFactor": 0}, "extensions": extensions
+        }))
+    };
+    let volume = json!({"thicknessFactor": 1, "attenuationDistance": 2, "attenuationColor": [1, 0.5, 0]});
+    let (body, warnings) = of(volume.clone(), json!({}));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!((body.flags, body.transmission), (MATERIAL_BLEND | MATERIAL_REFRACTS, 0.75));
+    let close = |a: f32, b: f64| assert!((f64::from(a) - b).abs() < 1e-2 * b, "{a} is not {b}");
+    close(body.specular[0], 1.0 / 9.0);
+    close(body.base_color[1], 0.5);
+    close(1.0 - body.base_color[3], 0.75 * (1.0 - 1.0 / 9.0));
+    let [red, green, blue] = unpack_absorption(body.absorption);
+    assert_eq!(red, 0.0);
+    close(green, 0.5f64.ln() / -2.0);
+    // What is black leaves a thousandth.
+    close(blue, 1e-3f64.ln() / -2.0);
+    // Without a thickness it is a wall; without a distance it is clear; specular colours are for others.
+    let (wall, _) = of(json!({"attenuationDistance": 2}), json!({}));
+    assert_eq!((wall.flags, wall.absorption), (MATERIAL_BLEND, 0));
+    assert_eq!(of(json!({"thicknessFactor": 1}), json!({})).0.absorption, 0);
+    let (_, warnings) = of(volume, json!({"KHR_materials_specular": {"specularFactor": 0.5}}));
+    assert!(warnings.len() == 1 && warnings[0].contains("refracts"), "{warnings:?}");
 }
 
 #[test]
