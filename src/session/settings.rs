@@ -112,9 +112,12 @@ settings! {
         /// Radiance of the rectangular light.
         rect_light_intensity: f64 = 10.0, "--rect-light-intensity X", Rule::Real(0.0, ANY), "", Light, Expert;
 
-        /// What pictures are made for: preview, exact. It stands for other settings, and single options win over it.
-        /// `preview`: the defaults. `exact`: one camera ray and one shadow ray a pixel, without exposure and tone map,
-        /// for measurements. Hits are exact with all of them.
+        /// What pictures are made for: draft, preview, high, exact. It stands for other settings, which
+        /// --print-settings shows, and single options win over it. `draft`: the sun's shadows alone, one sample.
+        /// `preview`: the defaults. `high`: all light, eight bounces, 16 samples, denoised. `exact`: one camera ray and
+        /// one shadow ray a pixel, without exposure and tone map, for measurements. On two cores a frame of 1280x720 of
+        /// a city takes 0.2 s, 1 s, 15 s and 0.2 s, one of Sponza 2 s, 9 s, 5 min and 2 s. Hits are exact with all of
+        /// them.
         quality: Quality = Quality::Preview, "--quality NAME", Rule::Any, "", Quality, Common;
         /// Samples per pixel. Beyond 64 they are summed in f64.
         spp: u32 = 4, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;

@@ -6,8 +6,12 @@ use std::fmt;
 /// What pictures are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
+    /// To find one's way: the fastest picture of the scene.
+    Draft,
     /// To be looked at; what all settings are by default.
     Preview,
+    /// To be shown: all light, and many samples.
+    High,
     /// To be measured: nothing between the rays and the picture.
     Exact,
 }
@@ -16,8 +20,10 @@ pub enum Quality {
 type Preset = (Quality, &'static str, &'static [(&'static str, &'static str)]);
 
 /// All of them, in the order of [`Quality`].
-const PRESETS: [Preset; 2] = [
+const PRESETS: [Preset; 4] = [
+    (Quality::Draft, "draft", &[("effects", "primary,shadow"), ("spp", "1")]),
     (Quality::Preview, "preview", &[]),
+    (Quality::High, "high", &[("effects", "path"), ("diffuse_rays", "1"), ("spp", "16"), ("denoise", "on")]),
     (
         Quality::Exact,
         "exact",
@@ -56,7 +62,7 @@ impl fmt::Display for Quality {
 }
 
 impl Value for Quality {
-    const NAMES: &'static [&'static str] = &[PRESETS[0].1, PRESETS[1].1];
+    const NAMES: &'static [&'static str] = &[PRESETS[0].1, PRESETS[1].1, PRESETS[2].1, PRESETS[3].1];
     const IS_PRESET: bool = true;
 
     fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
@@ -94,7 +100,9 @@ mod tests {
         }
         assert_eq!(Settings::from_options("--quality exact"), Ok(Settings::exact()));
         assert_eq!(Settings::exact().options(), "--quality exact");
-        assert!(Settings::from_options("--quality best").unwrap_err().to_string().contains("preview, exact"));
+        assert!(
+            Settings::from_options("--quality best").unwrap_err().to_string().contains("draft, preview, high, exact")
+        );
     }
 
     #[test]
