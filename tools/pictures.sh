@@ -1,0 +1,78 @@
+#!/usr/bin/env bash
+# Makes the pictures of docs/: generates a city, a plant, woods and a stadium, renders each with `--quality high`, beside
+# Sponza where its folder is given, and puts them on one sheet. Half an hour on two cores. Pictures that are there are
+# not made twice.
+#
+#   tools/pictures.sh DIR [SCENES]
+#
+# DIR keeps scenes and pictures; SCENES is a folder with sponza/Sponza.gltf. The sheet is DIR/pictures.jpg. It needs
+# python3 with pillow.
+set -euo pipefail
+
+root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
+brickwalk=${BRICKWALK:-$root/target/release/brickwalk}
+[ $# -ge 1 ] || { echo "usage: tools/pictures.sh DIR [SCENES]" >&2; exit 2; }
+[ -x "$brickwalk" ] || { echo "$brickwalk is not there: build with cargo build --release" >&2; exit 1; }
+mkdir -p "$1"
+out=$(cd -- "$1" && pwd)
+size=${SIZE:-1280x720}
+
+# A picture: its name, the scene, the camera path, and more options.
+picture() {
+    local name=$1 scene=$2 path=$3
+    shift 3
+    [ -e "$out/$name/frames/0000.png" ] && return
+    echo "$name"
+    "$brickwalk" walk "$scene" -o "$out/$name" --path "$path" --frames 1 --size "$size" --quality high --quiet "$@"
+}
+
+# A generated scene: its kind and its triangles.
+generated() {
+    [ -e "$out/$1.bricks" ] || "$brickwalk" scene "$1" --triangles "$2" --quiet -o "$out/$1.bricks"
+}
+
+generated city 4M
+picture city "$out/city.bricks" "$root/docs/city.json" --sun 0.7,0.5,0.5
+generated pipes 4M
+picture plant "$out/pipes.bricks" "$out/pipes.near.json"
+generated terrain 4M
+picture woods "$out/terrain.bricks" "$out/terrain.near.json" --sun -0.6,0.5,0.4
+generated stadium 4M
+picture stadium "$out/stadium.bricks" "$out/stadium.near.json" --sun 0.5,0.45,0.6
+if [ $# -ge 2 ]; then
+    [ -e "$out/sponza.bricks" ] || "$brickwalk" convert "$2/sponza/Sponza.gltf" --quiet -o "$out/sponza.bricks"
+    picture sponza "$out/sponza.bricks" "$root/paths/sponza_3.json" --sun 0.3,1,0.06
+fi
+
+python3 - "$out" <<'SHEET'
+import pathlib
+import sys
+
+from PIL import Image
+
+out = pathlib.Path(sys.argv[1])
+names = [name for name in ("sponza", "city", "woods", "plant", "stadium") if (out / name / "frames" / "0000.png").exists()]
+pictures = [Image.open(out / name / "frames" / "0000.png") for name in names]
+# The first is wide, the others two in a row below it.
+width, gap = 1600, 8
+first, rest = (pictures[:1], pictures[1:]) if len(pictures) % 2 else ([], pictures)
+
+
+def scaled(image, width):
+    return image.resize((width, image.height * width // image.width), Image.LANCZOS)
+
+
+rows = [[scaled(image, width) for image in first]] if first else []
+half = (width - gap) // 2
+rows += [[scaled(image, half) for image in rest[i : i + 2]] for i in range(0, len(rest), 2)]
+height = sum(row[0].height for row in rows) + gap * (len(rows) - 1)
+sheet, y = Image.new("RGB", (width, height), "white"), 0
+for row in rows:
+    x = 0
+    for image in row:
+        sheet.paste(image, (x, y))
+        x += image.width + gap
+    y += row[0].height + gap
+sheet.save(out / "pictures.jpg", quality=88)
+print(out / "pictures.jpg")
+SHEET
