@@ -262,8 +262,8 @@ pub const MATERIAL_BLEND: u32 = 2;
 pub const MATERIAL_DOUBLE_SIDED: u32 = 4;
 /// [`Material::flags`]: KHR_materials_unlit.
 pub const MATERIAL_UNLIT: u32 = 8;
-/// [`Material::flags`]: the surface of a closed body that bends light (KHR_materials_volume); together with BLEND. Where
-/// paths do not follow light through it, rays pass as through thin walls.
+/// [`Material::flags`]: the surface of a closed body that bends light (KHR_materials_volume); together with BLEND.
+/// Where paths do not follow light through it, rays pass as through thin walls.
 pub const MATERIAL_REFRACTS: u32 = 16;
 
 /// Textures of a material, each with its place in [`Material::uv_from_set`] and [`Material::uv_sets`].
@@ -316,8 +316,8 @@ pub struct Material {
     pub occlusion_strength: f32,
     /// Share of the surface that a clear coat covers (KHR_materials_clearcoat), 0..=1.
     pub clearcoat: f32,
-    /// What the dielectric part reflects along the normal, linear RGB, 0..=1. Of a body that refracts the red one stands
-    /// for its index of refraction, (1 + sqrt r) / (1 - sqrt r), and is less than 1.
+    /// What the dielectric part reflects along the normal, linear RGB, 0..=1. Of a body that refracts the red one
+    /// stands for its index of refraction, (1 + sqrt r) / (1 - sqrt r), and is less than 1.
     pub specular: [f32; 3],
     /// What it reflects at grazing angles, 0..=1.
     pub specular_weight: f32,

@@ -27,8 +27,8 @@ fn scrambled(word: u32, hash: u32) -> u32 {
     return x;
 }
 
-// Two words of a pixel's sample, of the first two dimensions of Sobol's sequence, each scrambled and both in an order of
-// their own (Burley 2020, "Practical Hash-based Owen Scrambling"): of 2^n samples from a multiple of 2^n on each
+// Two words of a pixel's sample, of the first two dimensions of Sobol's sequence, each scrambled and both in an order
+// of their own (Burley 2020, "Practical Hash-based Owen Scrambling"): of 2^n samples from a multiple of 2^n on each
 // elementary interval of 2^-n has one. The bits of the second dimension are sums over supersets of those of the index.
 fn spread2(index: u32, hash: u32) -> vec2<u32> {
     let own = reverseBits(scrambled(reverseBits(index), hash));

@@ -1,5 +1,6 @@
 // One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss, which may
-// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the direction was drawn are noted.
+// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the
+// direction was drawn are noted.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"

@@ -2,7 +2,8 @@
 // Smith's masking, Fresnel by Schlick, the light of further bounces between facets by Turquin (2019), and a clear coat
 // of the same kind on top. The diffuse part has what they leave of the light (the albedo scaling of
 // KHR_materials_specular), so that no energy is gained. Facets of bodies that refract let pass what they do not reflect
-// (Walter, Marschner, Li, Torrance 2007); the light of further bounces between them is lost. Twin: src/kernels/shade/gloss.rs.
+// (Walter, Marschner, Li, Torrance 2007); the light of further bounces between them is lost. Twin:
+// src/kernels/shade/gloss.rs.
 
 // Of a lobe's square root of roughness; smoother ones are as sharp as this.
 const LEAST_ALPHA: f32 = 0.001;

@@ -1,7 +1,8 @@
 // Which rays pass through a triangle: what the alpha of its material decides (glTF 2.0, section 3.9.4). MASK lets pass
 // where alpha is below the cutoff; BLEND where a number drawn for ray and triangle is not below alpha, so that the mean
-// over draws is what blending shows, and through a body that bends light no ray passes straight. Alpha is a function of the point on the triangle alone, so hits depend on no
-// order. Kernels of a scene without such triangles have a function in place of this file that says no.
+// over draws is what blending shows, and through a body that bends light no ray passes straight. Alpha is a function of
+// the point on the triangle alone, so hits depend on no order. Kernels of a scene without such triangles have a
+// function in place of this file that says no.
 #include "common/random.wgsl"
 
 // Opacity of each material, then texels, 16 to a vector.

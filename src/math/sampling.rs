@@ -176,8 +176,8 @@ mod tests {
         worst
     }
 
-    /// Of 2^n samples of a pixel, from a multiple of 2^n on, each elementary interval has one point in both pairs; random
-    /// ones leave some empty. Pixels, streams and seeds have points of their own.
+    /// Of 2^n samples of a pixel, from a multiple of 2^n on, each elementary interval has one point in both pairs;
+    /// random ones leave some empty. Pixels, streams and seeds have points of their own.
     #[test]
     fn samples_of_a_pixel_are_spread_evenly() {
         let points = |pixel, stream: u32, seed, count: u32| -> Vec<[u32; 4]> {

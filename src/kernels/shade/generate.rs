@@ -225,7 +225,8 @@ pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: 
 }
 
 /// One ray from every primary hit that reflects otherwise than diffusely, in a direction drawn by its gloss, which may
-/// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the direction was drawn are noted.
+/// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the
+/// direction was drawn are noted.
 pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
     let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
     let p = bound.params;

@@ -409,8 +409,8 @@ mod tests {
         assert!((drawn - expected).abs() < 4e-3 && expected > 0.05, "{drawn} instead of {expected}");
     }
 
-    /// What facets that refract reflect and let pass comes to all of it where they are smooth, from both sides, and to no
-    /// more where they are rough. Beyond the critical angle all is reflected.
+    /// What facets that refract reflect and let pass comes to all of it where they are smooth, from both sides, and to
+    /// no more where they are rough. Beyond the critical angle all is reflected.
     #[test]
     fn facets_that_refract_gain_nothing() {
         let m = Material { transmission: 1.0, flags: MATERIAL_REFRACTS, ..material(0.04, 0.0, 0.0) };
