@@ -52,6 +52,8 @@ pub fn accumulation(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
     for material in &mut source.materials {
         material.base_color = [0.0, 0.0, 0.0, 1.0];
         material.emission = GLOW;
+        // The camera is within.
+        material.flags |= bricks::MATERIAL_DOUBLE_SIDED;
     }
     let scene = lab.build(source, &settings(64, 0))?;
     let camera = camera([0.1, 0.2, -0.3], DVec3::X, 1.0);
