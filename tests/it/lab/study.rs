@@ -52,16 +52,16 @@ fn points_are_those_of_rows(output: &Path) {
 }
 
 /// Most FLIP and bias, percent, of methods in the small study against exact pictures of the same rays: what they were
-/// when this was written, and a twentieth.
+/// when samples were spread evenly, and a twentieth. One seed is seen: over 24 the denoiser errs as before (FLIP .026).
 const BOUNDS: [(&str, &str, f64, f64); 8] = [
-    ("ao", "roma", 0.0225, 1.7),
-    ("ao", "df", 0.0837, 6.7),
+    ("ao", "roma", 0.0232, 1.72),
+    ("ao", "df", 0.0828, 6.66),
     ("ao", "sift", 0.001, 0.1),
-    ("ao", "threshold", 0.0763, 2.85),
-    ("ao", "denoised", 0.0208, 0.36),
-    ("environment", "dvf", 0.1281, 6.71),
-    ("environment", "threshold", 0.1383, 4.25),
-    ("environment", "denoised", 0.1857, 9.44),
+    ("ao", "threshold", 0.0763, 2.81),
+    ("ao", "denoised", 0.023, 0.506),
+    ("environment", "dvf", 0.1196, 6.26),
+    ("environment", "threshold", 0.1244, 3.48),
+    ("environment", "denoised", 0.166, 9.11),
 ];
 
 #[test]

@@ -382,6 +382,15 @@ fn what_moves_is_traced_and_nothing_flickers() {
         up: DVec3::Y,
         fov_y: 70f64.to_radians(),
     };
+    let differ = |a: &FrameOutput, b: &FrameOutput| {
+        a.pixels.radiance.iter().zip(&b.pixels.radiance).filter(|(a, b)| a != b).count()
+    };
+    // What masks miss where nothing moves.
+    let mut unmoved = 0;
+    for step in 0..4 {
+        let [exact, field] = [0, 1].map(|i| all[i].frame(step, &camera).expect("a frame"));
+        unmoved += differ(&exact, &field);
+    }
     let (mut wrong, mut missed, mut answered) = (0, 0, 0);
     for step in 0..4 {
         let mut matrix = still.resident().instances[1].world_from_object;
@@ -394,18 +403,14 @@ fn what_moves_is_traced_and_nothing_flickers() {
         // Control: one that is not told that anything has moved.
         all[2].methods.set(Dvf::new(field.clone(), LABEL));
         let [exact, told, untold] = all.each_mut().map(|renderer| renderer.frame(step, &camera).expect("a frame"));
-        let differ = |a: &FrameOutput, b: &FrameOutput| {
-            a.pixels.radiance.iter().zip(&b.pixels.radiance).filter(|(a, b)| a != b).count()
-        };
         wrong += differ(&exact, &told);
         missed += differ(&exact, &untold);
         answered += rays(&told)[1];
         assert!(rays(&told)[0] < rays(&exact)[0] * 4 / 5, "{:?} of {:?}", rays(&told), rays(&exact));
     }
     println!(
-        "pixels of {}: {wrong} differ, {missed} of a field that is not told; {answered} rays answered",
+        "pixels of {}: {wrong} differ, {unmoved} where nothing moves, {missed} of a field that is not told; {answered} rays answered",
         4 * 96 * 72
     );
-    // What differs is what the masks miss without a mover, too: two pixels of a thousand, at most.
-    assert!(wrong <= 50 && missed > 3 * wrong.max(10), "{wrong} {missed}");
+    assert!(wrong <= unmoved + 10 && missed > 3 * wrong.max(10), "{wrong} {unmoved} {missed}");
 }
