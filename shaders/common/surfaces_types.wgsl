@@ -81,6 +81,7 @@ const GBUFFER_COARSER: u32 = 64u;  // a coarser level of a texture was looked up
 const GBUFFER_REFRACTS: u32 = 128u; // light is bent at the hit
 const GBUFFER_BACK: u32 = 256u;    // it is seen from behind, against its normals
 const GBUFFER_FIRST: u32 = 1u;     // bit of texture 0 among GBUFFER_WAITS
+const UNSHARED: f32 = 1.0e30;      // density of directions through facets: no lamp's rays bring the same light
 const BASE_COLOR: u32 = 0u;        // textures of a material, by number
 const NORMAL: u32 = 1u;            // its normal texture
 const METALLIC_ROUGHNESS: u32 = 2u; // its metallic-roughness texture

@@ -10,9 +10,6 @@
 #include "shade/gloss.wgsl"
 #include "shade/cones.wgsl"
 
-// What stands for the density of directions through facets: no lamp's rays bring the same light.
-const UNSHARED: f32 = 1.0e30;
-
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {

@@ -17,8 +17,6 @@
 const FIRST_CHANCE: u32 = 3u;
 // No path goes on for certain from there, so that all end.
 const MOST_LIKELY: f32 = 0.95;
-// What stands for the density of directions through facets: no lamp's rays bring the same light.
-const UNSHARED: f32 = 1.0e30;
 
 // One thread a pixel.
 @compute @workgroup_size(8, 8)

@@ -10,7 +10,7 @@ use super::shade::Pixels;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT,
-    PARAM_SCATTER, Params, Ray, Surface, T_INFINITE,
+    PARAM_SCATTER, Params, Ray, Surface, T_INFINITE, UNSHARED,
 };
 use crate::kernels::rays::{RaySet, start_hit};
 use crate::kernels::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
@@ -176,9 +176,6 @@ pub fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
     let (t_min, t_max) = if above { (0.0, t_max) } else { (1.0, 0.0) };
     Ray { origin: surface.point, t_min, direction, t_max }
 }
-
-/// What stands for the density of directions through facets: no lamp's rays bring the same light.
-pub(super) const UNSHARED: f32 = 1.0e30;
 
 /// What stands for the ray of a pixel without a hit.
 pub(super) fn none(origin: Vec3) -> Ray {

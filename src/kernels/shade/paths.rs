@@ -1,13 +1,13 @@
 //! How paths go on from a surface: twin of `shaders/shade/paths.wgsl` and `generate_path.wgsl`.
 
 use super::cones::{self, widen};
-use super::generate::{UNSHARED, for_each_leaving, none};
+use super::generate::{for_each_leaving, none};
 use super::gloss::{Drawn, Gloss, left_within};
 use super::lamps::unit;
 use super::random::tangent;
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Ray, T_INFINITE};
+use crate::kernels::layout::{Ray, T_INFINITE, UNSHARED};
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, least, most, most3, normalize};
 use crate::math::sampling::{pcg, points4};
