@@ -62,17 +62,15 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let index = global.y * params.width + global.x;
-    if (params.flags & PARAM_BOUNCE) == 0u {
-        radiance[index].w += 1.0;
-    }
     let ray = seen_rays[index];
     if !(ray.t_min <= ray.t_max) {
         return;
     }
-    let is_bounce = (params.flags & PARAM_BOUNCE) != 0u;
     var density = 0.0;
-    if is_bounce {
+    if (params.flags & PARAM_BOUNCE) != 0u {
         density = densities[index];
+    } else {
+        radiance[index].w += 1.0;
     }
     if seen_surfaces[index].leaf == NONE {
         // What occupancy maps met is lit otherwise.

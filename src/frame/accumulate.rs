@@ -34,13 +34,13 @@ impl Accumulation {
         });
     }
 
-    /// The mean of the samples. Of one batch it is the quotient in f32, which is what that in f64 would be rounded to,
-    /// as 53 ≥ 2 · 24 + 2 (Figueroa, "When is Double Rounding Innocuous?", 1995).
+    /// The mean of the samples, 0 of a pixel without any. Of one batch it is the quotient in f32, which is what that in
+    /// f64 would be rounded to, as 53 ≥ 2 · 24 + 2 (Figueroa, "When is Double Rounding Innocuous?", 1995).
     pub fn mean(&self) -> Vec<[f32; 3]> {
         if self.sums.is_empty() {
-            return self.first.par_iter().map(|sum| [0, 1, 2].map(|k| sum[k] / sum[3])).collect();
+            return self.first.par_iter().map(|sum| [0, 1, 2].map(|k| sum[k] / sum[3].max(1.0))).collect();
         }
-        self.sums.par_iter().map(|sum| [0, 1, 2].map(|k| (sum[k] / sum[3]) as f32)).collect()
+        self.sums.par_iter().map(|sum| [0, 1, 2].map(|k| (sum[k] / sum[3].max(1.0)) as f32)).collect()
     }
 }
 

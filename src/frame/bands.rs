@@ -40,10 +40,14 @@ impl FrameOutput {
         joint.join(&mut self.pixels.albedo, pixels.albedo);
         joint.join(&mut self.coverage, coverage);
         if let Some(mut guides) = guides {
-            let (seen, direct) = (std::mem::take(&mut guides.seen), std::mem::take(&mut guides.direct));
+            let seen = std::mem::take(&mut guides.seen);
+            let second = std::mem::take(&mut guides.second);
+            let [direct, around] = [&mut guides.direct, &mut guides.around].map(std::mem::take);
             let all = self.guides.get_or_insert(guides);
             joint.join(&mut all.seen, seen);
             joint.join(&mut all.direct, direct);
+            joint.join(&mut all.around, around);
+            joint.join(&mut all.second, second);
         }
     }
 }

@@ -25,8 +25,10 @@ pub struct RenderSettings {
     pub schedule: Schedule,
     /// What is traced beside camera rays.
     pub effects: Effects,
-    /// Samples a pixel.
+    /// Samples a pixel; with `noise` at most.
     pub samples: u32,
+    /// Noise below which pixels take no more samples, as a part of their value: [`super::noise`].
+    pub noise: Option<f64>,
     /// Seed of all random numbers.
     pub seed: u32,
     /// Ask which bricks every pass needed; which optimisations are on.

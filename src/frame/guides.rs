@@ -8,6 +8,7 @@ use crate::scene::{Camera, Projection};
 use crate::schedule::{ExecutorError, Pass};
 use bricks::Material;
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 /// What a pixel's first sample saw.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,10 +23,18 @@ pub struct Seen {
     pub id: u32,
     /// Width of the pixel at the hit, world units.
     pub footprint: f32,
-    /// Share of light from everywhere that it reflects, diffusely and otherwise, linear.
+    /// Share of light from everywhere that it reflects, diffusely and otherwise, linear; of a pixel's samples together
+    /// the mean, where those that see something else count as black.
     pub albedo: [f32; 3],
-    /// Linear radiance that it shows by itself, as much of it as is in the picture.
-    pub emission: [f32; 3],
+}
+
+/// The second surface that samples of a pixel saw.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Second {
+    /// What the first of these samples saw; the albedo is the mean over all samples of the pixel.
+    pub seen: Seen,
+    /// The light that it reflects, the mean over the samples.
+    pub light: [f32; 3],
 }
 
 impl Seen {
@@ -59,8 +68,13 @@ pub struct Guides {
     pub jitter: [f64; 2],
     /// Pixel by pixel.
     pub seen: Vec<Seen>,
-    /// What hits show by themselves and the light of sun and emitters, the mean over the samples.
+    /// The light of sun and emitters on what the first sample saw, the mean over the samples.
     pub direct: Vec<[f32; 3]>,
+    /// The rest beside what the first surface reflects of other light, the mean over the samples: what hits show by
+    /// themselves, the background, and all light on other surfaces.
+    pub around: Vec<[f32; 3]>,
+    /// The second surface, where samples saw another than the first one did.
+    pub second: Vec<Option<Second>>,
     /// What has moved since the frame before.
     pub moved: Moved,
 }
@@ -83,10 +97,80 @@ pub struct GuideReader {
     seen: Vec<Seen>,
     /// Radiance summed over the batch before the sample at hand.
     before: Vec<[f32; 4]>,
-    /// What the lamps' passes added, summed over samples.
-    direct: Vec<[f64; 3]>,
-    samples: u32,
+    /// The same after the lamps' passes.
+    lit: Vec<[f32; 4]>,
+    sums: Vec<Sums>,
+    /// What the first sample saw that saw another surface than the first of all.
+    second: Vec<Option<Seen>>,
     moved: Moved,
+}
+
+/// Which of its pixel's surfaces a sample sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Which {
+    /// That of the first sample.
+    First,
+    /// The other one that is kept.
+    Second,
+    /// One more, or the background.
+    #[default]
+    Other,
+}
+
+/// What is summed over the samples of a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    direct: [f64; 3],
+    around: [f64; 3],
+    /// Of the first and of the second surface.
+    albedos: [[f64; 3]; 2],
+    /// All light that the second one reflects.
+    second: [f64; 3],
+    samples: u32,
+    /// What the sample at hand sees.
+    which: Which,
+}
+
+impl Sums {
+    /// Takes the light that a sample has after the lamps' passes, beside what it saw, and what that shows by itself.
+    fn lamps(&mut self, added: [f64; 3], which: Which, seen: &Seen, emission: [f32; 3]) {
+        self.samples += 1;
+        self.which = which;
+        for (k, added) in added.into_iter().enumerate() {
+            let [emission, albedo] = [emission[k], seen.albedo[k]].map(f64::from);
+            match which {
+                Which::First => {
+                    self.around[k] += emission;
+                    self.direct[k] += added - emission;
+                    self.albedos[0][k] += albedo;
+                }
+                Which::Second => {
+                    self.around[k] += added;
+                    self.second[k] += added - emission;
+                    self.albedos[1][k] += albedo;
+                }
+                Which::Other => self.around[k] += added,
+            }
+        }
+    }
+
+    /// Takes all other light of the sample.
+    fn rest(&mut self, added: [f64; 3]) {
+        for (k, added) in added.into_iter().enumerate() {
+            self.around[k] += if self.which == Which::First { 0.0 } else { added };
+            self.second[k] += if self.which == Which::Second { added } else { 0.0 };
+        }
+    }
+
+    /// A sum's mean over the samples.
+    fn mean(&self, sum: [f64; 3]) -> [f32; 3] {
+        sum.map(|x| (x / f64::from(self.samples.max(1))) as f32)
+    }
+}
+
+/// What was added to radiance that is summed.
+fn added(now: [f32; 4], before: [f32; 4]) -> [f64; 3] {
+    [0, 1, 2].map(|k| f64::from(now[k]) - f64::from(before[k]))
 }
 
 /// What the surface of a hit reflects of light from everywhere.
@@ -104,90 +188,114 @@ impl GuideReader {
             jitter: [0.5; 2],
             seen: Vec::new(),
             before: Vec::new(),
-            direct: Vec::new(),
-            samples: 0,
+            lit: Vec::new(),
+            sums: Vec::new(),
+            second: Vec::new(),
             moved: moved.clone(),
         }
     }
 
-    /// Takes the light of sun and emitters, whose passes for sample `sample` have just ended.
+    /// Takes what sample `sample` saw as `view` says, and the light of sun and emitters, whose passes have just ended;
+    /// `materials` are those of the scene.
     ///
     /// # Errors
     /// The device's.
-    pub fn lamps(&mut self, executor: &mut dyn FrameExecutor, sample: u32) -> Result<(), ExecutorError> {
-        let now = executor.read_radiance()?;
-        if sample.is_multiple_of(BATCH_SAMPLES) {
-            self.before = vec![[0.0; 4]; now.len()];
-        }
-        self.direct.resize(now.len(), [0.0; 3]);
-        for (sum, (now, before)) in self.direct.iter_mut().zip(now.iter().zip(&self.before)) {
-            for k in 0..3 {
-                sum[k] += f64::from(now[k]) - f64::from(before[k]);
-            }
-        }
-        self.samples += 1;
-        Ok(())
-    }
-
-    /// Ends sample `sample` of `samples`, seen as `view` says; `materials` are those of the scene.
-    ///
-    /// # Errors
-    /// The device's.
-    pub fn sample(
+    pub fn lamps(
         &mut self,
         executor: &mut dyn FrameExecutor,
         materials: &[Material],
         view: &View,
-        (sample, samples): (u32, u32),
+        sample: u32,
     ) -> Result<(), ExecutorError> {
+        self.lit = executor.read_radiance()?;
+        if sample.is_multiple_of(BATCH_SAMPLES) {
+            self.before = vec![[0.0; 4]; self.lit.len()];
+        }
+        let seen = self.read(executor, materials, view)?;
         if sample == 0 {
             self.jitter = [0, 1].map(|k| f64::from(view.params.jitter[k]));
-            self.read(executor, materials, view)?;
+            self.seen = seen.iter().map(|(seen, _)| *seen).collect();
+            self.sums = vec![Sums::default(); seen.len()];
+            self.second = vec![None; seen.len()];
         }
-        if sample + 1 < samples {
-            self.before = executor.read_radiance()?;
-        }
+        let light = self.lit.par_iter().zip(&self.before);
+        let surfaces = self.seen.par_iter().zip(&mut self.second);
+        let pixels = self.sums.par_iter_mut().zip(surfaces).zip(light.zip(&seen)).with_min_len(1024);
+        pixels.for_each(|((sums, (first, second)), ((&lit, &before), (seen, emission)))| {
+            // Pixels that have stopped take no sample.
+            if lit[3] > before[3] {
+                let which = match seen {
+                    seen if first.is_same_surface(seen) => Which::First,
+                    seen if !seen.is_hit() => Which::Other,
+                    seen if second.get_or_insert(*seen).is_same_surface(seen) => Which::Second,
+                    _ => Which::Other,
+                };
+                sums.lamps(added(lit, before), which, seen, *emission);
+            }
+        });
         Ok(())
     }
 
+    /// Ends a sample.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn sample(&mut self, executor: &mut dyn FrameExecutor) -> Result<(), ExecutorError> {
+        let before = std::mem::replace(&mut self.before, executor.read_radiance()?);
+        let light = self.before.par_iter().zip(&self.lit);
+        let pixels = self.sums.par_iter_mut().zip(light.zip(&before)).with_min_len(1024);
+        pixels.for_each(|(sums, ((&now, &lit), before))| {
+            if lit[3] > before[3] {
+                sums.rest(added(now, lit));
+            }
+        });
+        Ok(())
+    }
+
+    /// What the pixels of the sample at hand see, and the radiance that they show by themselves.
     fn read(
-        &mut self,
+        &self,
         executor: &mut dyn FrameExecutor,
         materials: &[Material],
         view: &View,
-    ) -> Result<(), ExecutorError> {
+    ) -> Result<Vec<(Seen, [f32; 3])>, ExecutorError> {
         let rays: Vec<Ray> = executor.read_rays(Pass::Primary)?;
         let hits: Vec<Hit> = executor.read_hits(Pass::Primary)?;
         let surfaces: Vec<Surface> = executor.read_surfaces(Pass::Primary)?;
         let gbuffer: Vec<GBuffer> = executor.read_gbuffer()?;
         let in_f64 = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
-        let all = rays.iter().zip(&hits).zip(surfaces.iter().zip(&gbuffer));
-        self.seen = all
+        let all = rays.par_iter().zip(&hits).zip(surfaces.par_iter().zip(&gbuffer)).with_min_len(1024);
+        let all = all
             .map(|((ray, hit), (surface, g))| {
                 let is_hit = hit.id != NONE;
                 let way = in_f64(ray.direction);
                 let point = view.frame.origin + view.frame.unit * (in_f64(ray.origin) + f64::from(hit.t) * way);
                 let point = if is_hit { point } else { way };
-                Seen {
+                let seen = Seen {
                     point,
                     plane: Vec3::from_array(surface.normal),
                     normal: Vec3::from_array(g.normal),
                     id: hit.id,
                     footprint: if is_hit { self.projection.footprint(point) as f32 } else { 0.0 },
                     albedo: if is_hit { albedo(g, materials, ray) } else { [0.0; 3] },
-                    emission: if is_hit { g.emission } else { [0.0; 3] },
-                }
+                };
+                (seen, if is_hit { g.emission } else { [0.0; 3] })
             })
             .collect();
-        Ok(())
+        Ok(all)
     }
 
     /// The guides of the frame.
     pub fn finish(self) -> Guides {
-        let count = f64::from(self.samples.max(1));
-        let direct = self.direct.iter().map(|sum| sum.map(|x| (x / count) as f32)).collect();
-        let Self { size, projection, jitter, seen, moved, .. } = self;
-        Guides { size, projection, jitter, seen, direct, moved }
+        let Self { size, projection, jitter, mut seen, second, sums, moved, .. } = self;
+        seen.iter_mut().zip(&sums).for_each(|(seen, sums)| seen.albedo = sums.mean(sums.albedos[0]));
+        let [direct, around] = [|sums: &Sums| sums.mean(sums.direct), |sums: &Sums| sums.mean(sums.around)]
+            .map(|of| sums.iter().map(of).collect());
+        let second = second.iter().zip(&sums).map(|(second, sums)| {
+            let of = |seen: &Seen| Seen { albedo: sums.mean(sums.albedos[1]), ..*seen };
+            second.as_ref().map(|seen| Second { seen: of(seen), light: sums.mean(sums.second) })
+        });
+        Guides { size, projection, jitter, seen, direct, around, second: second.collect(), moved }
     }
 }
 

@@ -4,6 +4,7 @@ use super::bands::Joint;
 use super::correct::correct;
 use super::engine::RenderSettings;
 use super::half_rate;
+use super::noise::{LEAST, Noise};
 use super::{
     Accumulation, BATCH_SAMPLES, Effects, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState,
     Pixels, camera_view,
@@ -217,6 +218,10 @@ impl Band<'_> {
         let mut accumulation = Accumulation::default();
         // Nobody is told the sums of a part of the picture.
         let is_told = engine.bands().len() == 1 && !engine.settings.only_chosen;
+        let rows = [engine.size.0 as usize, engine.band_rows as usize];
+        let mut noise = engine.settings.noise.map(|target| Noise::new(target, rows));
+        // So many samples stand for a pixel when textures are looked up.
+        let shares = if noise.is_some() { LEAST } else { engine.settings.samples };
         let mut guides = engine.settings.guides.then(|| GuideReader::new(camera, engine.size, &engine.moved));
         for sample in 0..engine.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
@@ -238,7 +243,7 @@ impl Band<'_> {
                 view.params.clip = [normal.x as f32, normal.y as f32, normal.z as f32, off as f32];
             }
             // Each sample stands for its share of the pixel: textures are looked up by that.
-            view.params.step_y[3] /= (engine.settings.samples as f32).sqrt();
+            view.params.step_y[3] /= (shares as f32).sqrt();
             if engine.settings.taa {
                 let [x, y] = pixel_jitter(frame, sample, engine.settings.samples);
                 view.params.jitter = [x, y, 0.0, 0.0];
@@ -251,7 +256,9 @@ impl Band<'_> {
                 }
             }
             records.pass(engine, "primary", |r, stats| {
-                r.trace(frame, Pass::Primary, [&[Step::Generate], &[]], stats)?;
+                let stop = noise.as_ref().and_then(Noise::step);
+                let first: Vec<Step> = std::iter::once(Step::Generate).chain(stop).collect();
+                r.trace(frame, Pass::Primary, [&first, &[]], stats)?;
                 r.resolve(Pass::Primary, stats)?;
                 let sky = effects.occlusion.is_none() && effects.diffuse.is_none() && !r.draws_environment();
                 let shading =
@@ -267,7 +274,7 @@ impl Band<'_> {
             }
             light(engine, methods, records, ["primary", "shadow"], Pass::Shadow)?;
             if let Some(guides) = &mut guides {
-                guides.lamps(&mut *engine.executor, sample)?;
+                guides.lamps(&mut *engine.executor, &engine.scene.resident().materials, &view, sample)?;
             }
             light_environment(engine, methods, records, "environment", Pass::Shadow)?;
             passes.advance()?;
@@ -293,15 +300,14 @@ impl Band<'_> {
                 read_aovs(engine, view.frame.unit, &mut output.pixels)?;
             }
             if let Some(guides) = &mut guides {
-                guides.sample(
-                    &mut *engine.executor,
-                    &engine.scene.resident().materials,
-                    &view,
-                    (sample, engine.settings.samples),
-                )?;
+                guides.sample(&mut *engine.executor)?;
             }
             let finished = sample + 1;
-            let is_batch = finished.is_multiple_of(BATCH_SAMPLES) || finished == engine.settings.samples;
+            if let Some(noise) = &mut noise {
+                noise.note(&mut *engine.executor, finished)?;
+            }
+            let is_last = finished == engine.settings.samples || noise.as_ref().is_some_and(Noise::is_done);
+            let is_batch = finished.is_multiple_of(BATCH_SAMPLES) || is_last;
             let goes_on = if is_batch {
                 let mut sum = engine.executor.read_radiance()?;
                 if let Some(before) = &before {
@@ -318,6 +324,9 @@ impl Band<'_> {
             };
             if !goes_on {
                 return Err(RenderError::Interrupted);
+            }
+            if is_last {
+                break;
             }
         }
         output.pixels.radiance = accumulation.mean();

@@ -5,8 +5,8 @@
 //!
 //! Modules know those before them: plain structures ([`vector`], [`layout`], [`frame`], [`lamps`], [`payloads`] …);
 //! what every twin is given ([`bound`], [`rays`], [`tiles`]); the families [`trace`], [`query`], [`texture`],
-//! [`shade`]; the [`table`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the families the node test alone
-//! ([`trace::node`]).
+//! [`shade`]; the [`table`], and [`noise`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the families the
+//! node test alone ([`trace::node`]).
 
 pub mod bound;
 pub mod dispatch;
@@ -17,6 +17,7 @@ mod frame_executor;
 pub mod lamps;
 pub mod layout;
 pub mod levels;
+pub mod noise;
 pub mod opacity;
 pub mod payloads;
 pub mod query;

@@ -13,11 +13,13 @@ use crate::kernels::table::Family;
 
 pub use choice::{EffectMethods, Method};
 
-/// The kernels of all methods: what is compared on both executors.
+/// The kernels of all methods, and those that stop pixels: what is compared on both executors beside those that all
+/// frames take.
 pub static FAMILIES: &[&Family] = &[
     #[cfg(feature = "lab")]
     &df::kernels::FAMILY,
     &displacement::kernels::FAMILY,
+    &crate::kernels::noise::FAMILY,
     &dvf::kernels::FAMILY,
     &roma::kernels::FAMILY,
     &rsm::kernels::FAMILY,

@@ -1,7 +1,7 @@
 //! How much memory the pictures of a session take. Of a picture that is rendered in bands, rays and what shading keeps
 //! are those of one band; what is joined of all of them is on the host.
 
-use crate::frame::Seen;
+use crate::frame::{Second, Seen};
 use crate::kernels::layout::{GBuffer, Hit, Ray, Surface};
 use crate::picture::denoise::Past;
 use crate::session::Settings;
@@ -23,8 +23,10 @@ pub struct PictureBytes {
 
 /// Of the sums of a frame's samples in f64, of what is read back and of their mean.
 const SUMS: u64 = 32 + 16 + 12;
-/// Of what lamps add, before and after, in the sums that guides keep.
-const GUIDE_SUMS: u64 = 24 + 16;
+/// Of the sums that guides keep, of radiance before and after the lamps, of second surfaces, and of what a sample saw.
+const GUIDE_SUMS: u64 = 136 + 32 + 2 * size_of::<Option<Seen>>() as u64 + 12;
+/// Of the noise of a pixel's samples, and of what is read back to find it.
+const NOISE: u64 = 12 + 16;
 /// Of the mean of the samples, and whether a surface was seen.
 const MEAN: u64 = 12 + 1;
 /// Of depth, normal, id and albedo.
@@ -46,15 +48,16 @@ impl PictureBytes {
         let bounces = if settings.effects.diffuse || settings.effects.glossy { set + shading + 20 } else { 0 };
         let device = 2 * set + shading + 16 + bounces;
         let has_guides = settings.denoise || settings.taa;
-        let guides = if has_guides { 2 * size_of::<Seen>() as u64 } else { 0 };
+        let guides = if has_guides { 2 * (size_of::<Seen>() + size_of::<Option<Second>>() + 12) as u64 } else { 0 };
         let filter = if settings.denoise { 2 * size_of::<Past>() as u64 + FILTER } else { 0 };
         let read = if settings.aov || has_guides { set + shading } else { 0 };
         let (aovs, layers) = if settings.aov { (AOVS, AOV_LAYERS) } else { (0, 0) };
+        let sums = SUMS + if settings.noise.is_some() { NOISE } else { 0 };
         let sessions = if settings.measure_error { 2 } else { 1 };
         Self {
             device: sessions * device,
-            host: sessions * SUMS + guides + aovs + filter.max(read).max(layers),
-            band: SUMS + read + if has_guides { GUIDE_SUMS } else { 0 },
+            host: sessions * sums + guides + aovs + filter.max(read).max(layers),
+            band: sums + read + if has_guides { GUIDE_SUMS } else { 0 },
             joined: MEAN + guides + aovs + filter.max(layers).max(FINISH),
         }
     }

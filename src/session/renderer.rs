@@ -97,6 +97,7 @@ pub fn render_settings(settings: &Settings, schedule: Schedule) -> RenderSetting
         schedule,
         effects: effects(settings),
         samples: settings.samples(),
+        noise: settings.noise,
         // Both halves of the seed count.
         seed: (settings.seed ^ (settings.seed >> 32)) as u32,
         tracing: Tracing { measure_needed: settings.measure_needed, optimisations: settings.optimisations() },

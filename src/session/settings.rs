@@ -1,5 +1,6 @@
 //! Every setting of what renders. A method of `secondary/` declares its own in its folder; here each is a line.
 
+use crate::frame::noise::LEAST;
 use crate::frame::{BATCH_SAMPLES, Effects};
 use crate::picture::exposure::Exposure;
 use crate::picture::tone_map::ToneMap;
@@ -121,6 +122,10 @@ settings! {
         quality: Quality = Quality::Preview, "--quality NAME", Rule::Any, "", Quality, Common;
         /// Samples per pixel. Beyond 64 they are summed in f64.
         spp: u32 = 4, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
+        /// Noise at which a pixel takes no more samples: the standard error of its mean as a part of that, as 0.02.
+        /// Blocks of 8x8 pixels are judged together, after 16 samples and after every 8 more; --spp is the most that
+        /// one takes. `summary.json` says how many they took. [default: off, all take --spp]
+        noise: Option<f64> = None, "--noise PART", Rule::Real(1e-6, 1.0), "", Quality, Expert;
         /// Levels of detail: the error, in pixels, at which a coarser level stands for bricks; 0 is exact. 1 is hardly
         /// seen, more loads less. Secondary rays are wider than pixels and take coarser levels. Needs a scene converted
         /// with `--lod on`.
@@ -309,6 +314,30 @@ impl Settings {
                 let text = format!(
                     "--frame-budget and {other} exclude each other: rays of a budget meet what has arrived, \
                                     others wait; leave one out"
+                );
+                return Err(SettingsError::Conflict(text));
+            }
+        }
+        if let Some(noise) = self.noise {
+            let compare = [
+                (self.taa, "--taa"),
+                (self.measure_error, "--measure-error"),
+                (self.lod_correct.is_some(), "--lod-correct"),
+                (self.secondary.has(Method::Auto), "--secondary auto"),
+                (self.frame_budget().is_some(), "--frame-budget"),
+            ];
+            if let Some((_, other)) = compare.into_iter().find(|(is_on, _)| *is_on) {
+                let text = format!(
+                    "--noise and {other} exclude each other: one compares pictures of as many samples everywhere; leave \
+                     one out"
+                );
+                return Err(SettingsError::Conflict(text));
+            }
+            if self.samples() <= LEAST {
+                let text = format!(
+                    "--noise {noise}: every pixel takes {LEAST} samples, and --spp {} is the most that one takes; give \
+                     more, as --spp 256",
+                    self.samples()
                 );
                 return Err(SettingsError::Conflict(text));
             }

@@ -102,6 +102,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: LeftOut, vid
             "exposure": s.exposure.plain(),
             "exposure_ev": stops,
             "tone_map": s.tone_map.name(),
+            "samples_mean": samples_mean(s, stops.len(), records),
             "video": video,
         },
         "denoise": resolve.report(),
@@ -122,6 +123,13 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: LeftOut, vid
         "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
         "non_finite": records.iter().map(|r| r.non_finite).sum::<u64>(),
     })
+}
+
+/// Samples that pixels took on average: camera rays of a pixel.
+fn samples_mean(settings: &Settings, frames: usize, records: &[Record]) -> f64 {
+    let rays: u64 = records.iter().filter(|record| record.pass == "primary").map(|record| record.rays_traced).sum();
+    let pixels = u64::from(settings.size.width) * u64::from(settings.size.height) * frames.max(1) as u64;
+    rays as f64 / pixels as f64
 }
 
 /// Names of the optimisations that are off, in one order, each once.

@@ -40,6 +40,7 @@ mod exact {
     mod hidden;
     mod levels;
     mod motion;
+    mod paths;
     mod rays;
     mod records;
     mod threshold;
@@ -67,6 +68,7 @@ mod scenes {
 
 /// Light, materials and filters of the picture against closed forms.
 mod shading {
+    mod adaptive;
     mod aov;
     mod glass;
     mod gloss;

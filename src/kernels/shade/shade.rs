@@ -147,14 +147,16 @@ fn seen_emission(bound: &Bound, g: &GBuffer, m: &Material, seen: &RaySet, index:
 pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, materials: &[Material]) {
     let params = bound.params;
     for_each_pixel(bound, pixels, shaded, |index, g, radiance, (_, densities)| {
-        if !bound.has(PARAM_BOUNCE) {
-            radiance[3] += 1.0;
-        }
         let ray = &seen.rays[index];
         if !is_traced(ray) {
             return None;
         }
-        let density = if bound.has(PARAM_BOUNCE) { densities[index] } else { 0.0 };
+        let mut density = 0.0;
+        if bound.has(PARAM_BOUNCE) {
+            density = densities[index];
+        } else {
+            radiance[3] += 1.0;
+        }
         if seen.surfaces[index].leaf == NONE {
             // What occupancy maps met is lit otherwise.
             let is_miss = bound.has(PARAM_MISS) && seen.hits[index].id != MET;

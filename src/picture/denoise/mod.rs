@@ -113,7 +113,7 @@ impl Denoiser {
         report.energy_lost_share = if report.energy > 0.0 { report.energy_lost / report.energy } else { 0.0 };
         report.disoccluded += taps.iter().zip(&guides.seen).filter(|(t, s)| t.is_none() && s.is_hit()).count() as u64;
         report.non_finite += parts.non_finite + done.non_finite;
-        recompose(&guides, &parts.around, &lit, radiance);
+        recompose(&grid, &guides, &parts.around, &lit, radiance);
         self.before = Some(guides);
         done.non_finite
     }

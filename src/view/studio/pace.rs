@@ -59,6 +59,7 @@ impl Pace {
         Settings {
             frame_budget: budget(settings, self.budget),
             interactive: None,
+            noise: None,
             aov: !settings.taa,
             ..settings.clone()
         }

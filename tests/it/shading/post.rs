@@ -277,12 +277,61 @@ fn light_of_an_environment_loses_its_noise_and_its_wrong_colours() {
     };
     let radiance = filtered(&guides);
     // The control: taken as light of lamps, whose samples are alike, it keeps most of its noise.
-    let as_lamps = filtered(&Guides { direct: input.clone(), ..guides });
+    let all = input.iter().zip(&guides.around).map(|(a, b)| [0, 1, 2].map(|k| a[k] - b[k])).collect();
+    let as_lamps = filtered(&Guides { direct: all, ..guides });
     let [before, after, control] = [&input, &radiance, &as_lamps].map(|picture| flip(picture, &exact));
     let [noise, left, kept] = [&input, &radiance, &as_lamps].map(|picture| rmse(picture, &exact));
     println!("FLIP {before:.4} to {after:.4}, as lamps {control:.4}; RMSE {noise:.4} to {left:.4}, as lamps {kept:.4}");
     assert!(before > 1.35 * after && noise > 4.0 * left, "FLIP {before} to {after}, RMSE {noise} to {left}");
     assert!(control > 1.1 * after && kept > 2.0 * left, "as lamps FLIP {control}, {after}; RMSE {kept}, {left}");
+}
+
+/// Of pixels whose samples see several surfaces, or a surface and the sky, the filter changes the first one's light
+/// alone.
+#[test]
+fn edges_stay_smooth() {
+    let folder = common::folder();
+    let scene = court(folder.path());
+    // The filter takes noise out of few samples, and must not blur what many show.
+    for (samples, most) in [(4, 0.8), (16, 1.2)] {
+        let [noise, left, by_first] = errors_at_edges(&scene, samples);
+        println!("{samples} samples: {noise:.4} to {left:.4}, {by_first:.4} by the first one");
+        assert!(left < most * noise && by_first > 1.12 * left, "{samples}: {noise} {left} {by_first}");
+    }
+}
+
+/// Root mean square errors at edges of a frame of so many samples: as it is, filtered, and, the control, filtered as if
+/// all samples saw what the first one did.
+fn errors_at_edges(scene: &Path, samples: u32) -> [f64; 3] {
+    let (mut many, mut one) = (renderer(scene, &format!("{NOISY} --spp {samples}")), renderer(scene, NOISY));
+    let camera = eye(0);
+    let mut output = many.frame(0, &camera).expect("a frame");
+    let (guides, input) = (guides(&mut output), output.pixels.radiance);
+    let frames: Vec<_> =
+        (1..1 + 256 / samples).map(|k| many.frame(k, &camera).expect("a frame").pixels.radiance).collect();
+    let mean = |i: usize| [0, 1, 2].map(|k| frames.iter().map(|frame| frame[i][k]).sum::<f32>() / frames.len() as f32);
+    let truth: Vec<[f32; 3]> = (0..WIDTH * HEIGHT).map(mean).collect();
+    let is_edge = |i: usize| {
+        let differs = |other: usize| guides.seen.get(other).is_some_and(|seen| !guides.seen[i].is_same_surface(seen));
+        i % WIDTH + 1 < WIDTH && (differs(i + 1) || differs(i + WIDTH))
+    };
+    let edges: Vec<usize> = (0..WIDTH * HEIGHT).filter(|&i| is_edge(i)).collect();
+    let filtered = |guides: &Guides| {
+        let mut radiance = input.clone();
+        Denoiser::default().frame(guides.clone(), &mut radiance);
+        radiance
+    };
+    let first = one.frame(0, &camera).expect("a frame").guides.expect("guides");
+    let sum = |i: usize| [0, 1, 2].map(|k| guides.direct[i][k] + guides.around[i][k] - first.around[i][k]);
+    let taken = Guides { direct: (0..WIDTH * HEIGHT).map(sum).collect(), ..first };
+    let at = |pixels: &[usize], radiance: &[[f32; 3]]| {
+        let of = |picture: &[[f32; 3]]| pixels.iter().map(|&i| picture[i]).collect::<Vec<_>>();
+        let (a, b) = (of(radiance), of(&truth));
+        rmse(&a, &b) * ((WIDTH * HEIGHT) as f64 / a.len() as f64).sqrt()
+    };
+    let radiance = filtered(&guides);
+    assert!(edges.len() > 200, "{} pixels of edges", edges.len());
+    [&input, &radiance, &filtered(&taken)].map(|picture| at(&edges, picture))
 }
 
 /// A wall of grey light with some noise, and in it pixels far too bright, one in blue alone, whose luminance is no more
@@ -299,7 +348,7 @@ fn fireflies_of_any_colour_are_cut() {
         let point = camera.position - direction * (5.0 / direction.dot(toward));
         let normal = toward.as_vec3();
         let footprint = projection.footprint(point) as f32;
-        Seen { point, plane: normal, normal, id: 1, footprint, albedo: [0.5; 3], emission: [0.0; 3] }
+        Seen { point, plane: normal, normal, id: 1, footprint, albedo: [0.5; 3] }
     };
     let guides = Guides {
         size,
@@ -307,6 +356,8 @@ fn fireflies_of_any_colour_are_cut() {
         jitter: [0.5; 2],
         seen: (0..WIDTH * HEIGHT).map(seen).collect(),
         direct: vec![[0.0; 3]; WIDTH * HEIGHT],
+        around: vec![[0.0; 3]; WIDTH * HEIGHT],
+        second: Vec::new(),
         moved: Moved::default(),
     };
     let grey = |i: usize| 0.2 + 0.1 * (i.wrapping_mul(2_654_435_761) % 1024) as f32 / 1024.0;

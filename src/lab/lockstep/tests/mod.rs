@@ -6,6 +6,7 @@ mod scenes;
 use self::scenes::{textured, with_fields, with_levels};
 use super::{Defect, Findings, Lockstep};
 use crate::cpu::CpuExecutor;
+use crate::frame::noise::LEAST;
 use crate::frame::{
     Budgeted, Effects, Engine, Equirectangular, FrameBudget, Light, Moved, Occlusion, RenderSettings, Renderer,
     Schedule, emissive_triangles, environment,
@@ -108,6 +109,8 @@ struct Variant {
     lod: Lod,
     /// Bounces.
     bounces: u32,
+    /// Noise below which pixels take no more samples.
+    noise: Option<f64>,
 }
 
 const VARIANT: Variant = Variant {
@@ -129,6 +132,7 @@ const VARIANT: Variant = Variant {
     dvf: None,
     lod: Lod { pixels: 0.0, blend: false, angle: 0.0, given: false },
     bounces: 1,
+    noise: None,
 };
 
 fn effects() -> Effects {
@@ -279,7 +283,8 @@ fn render(
             }),
             schedule: variant.schedule,
             effects: Effects { bounces: variant.bounces, ..effects() },
-            samples: 1,
+            samples: if variant.noise.is_some() { LEAST + 1 } else { 1 },
+            noise: variant.noise,
             seed: 3,
             tracing,
             guides: false,
@@ -369,6 +374,9 @@ fn twins_agree_with_their_kernels() {
         Variant { clip: Some(DVec3::new(0.3, 1.0, -0.2)), ..VARIANT },
         Variant { half_rate: true, ..VARIANT },
         Variant { bounces: 3, ..VARIANT },
+        // Some blocks stop, and some go on.
+        Variant { noise: Some(0.05), everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
+        Variant { noise: Some(0.1), everything_fits: true, ..VARIANT },
         Variant { bounces: 4, everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { half_rate: true, clip: Some(DVec3::Y), schedule: Schedule::Demand, ..VARIANT },
         Variant { hides: 7, ..VARIANT },
