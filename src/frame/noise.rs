@@ -3,7 +3,7 @@
 //! The noise of a pixel is the standard error of its mean luminance, by the variance of the means of rounds of
 //! [`ROUND`] samples (Welford, "Note on a Method for Calculating Corrected Sums of Squares and Products", 1962).
 //! Samples of a round are spread evenly, so rounds vary less than as many samples that are not, and the mean of rounds
-//! less still than independent ones: the noise is rather less than is found.
+//! less still than independent ones: the error comes out at about half of what is found.
 //!
 //! To stop where few samples look alike shows too little of what is rarely met: of a pixel that has missed it so far,
 //! no sample comes any more. So pixels are judged together, in blocks of 8x8: the root mean square of their noise
