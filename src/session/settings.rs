@@ -117,7 +117,7 @@ settings! {
         /// --print-settings shows, and single options win over it. `draft`: the sun's shadows alone, one sample.
         /// `preview`: the defaults. `high`: all light, eight bounces, 16 samples, denoised. `exact`: one camera ray and
         /// one shadow ray a pixel, without exposure and tone map, for measurements. On two cores a frame of 1280x720 of
-        /// a city takes 0.2 s, 1 s, 15 s and 0.2 s, one of Sponza 2 s, 9 s, 5 min and 2 s. Hits are exact with all of
+        /// a city takes 0.5 s, 2 s, 90 s and 0.3 s, one of Sponza 2 s, 9 s, 5 min and 2 s. Hits are exact with all of
         /// them.
         quality: Quality = Quality::Preview, "--quality NAME", Rule::Any, "", Quality, Common;
         /// Samples per pixel. Beyond 64 they are summed in f64.
