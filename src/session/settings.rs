@@ -328,8 +328,8 @@ impl Settings {
             ];
             if let Some((_, other)) = compare.into_iter().find(|(is_on, _)| *is_on) {
                 let text = format!(
-                    "--noise and {other} exclude each other: one compares pictures of as many samples everywhere; leave \
-                     one out"
+                    "--noise and {other} exclude each other: one compares pictures of as many samples everywhere; \
+                     leave one out"
                 );
                 return Err(SettingsError::Conflict(text));
             }

@@ -409,7 +409,8 @@ fn what_moves_is_traced_and_nothing_flickers() {
         assert!(rays(&told)[0] < rays(&exact)[0] * 4 / 5, "{:?} of {:?}", rays(&told), rays(&exact));
     }
     println!(
-        "pixels of {}: {wrong} differ, {unmoved} where nothing moves, {missed} of a field that is not told; {answered} rays answered",
+        "pixels of {}: {wrong} differ, {unmoved} where nothing moves, {missed} of a field that is not told; \
+         {answered} rays answered",
         4 * 96 * 72
     );
     assert!(wrong <= unmoved + 10 && missed > 3 * wrong.max(10), "{wrong} {unmoved} {missed}");
