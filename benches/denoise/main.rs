@@ -147,7 +147,7 @@ fn frame(renderer: &mut Renderer, jittered: &mut Renderer, going: &mut Going, k:
     let mut denoised = noisy.clone();
     let is_hit: Vec<bool> = guides.seen.iter().map(|seen| seen.is_hit()).collect();
     going.denoiser.frame(guides, &mut denoised);
-    let past = &going.denoiser.layers_mut()[1].past;
+    let past = &going.denoiser.past(1);
     let new = past.iter().zip(&is_hit).map(|(past, hit)| *hit && past.length <= 1.0).collect();
     let mut taa = moved.clone();
     going.taa.frame(&moved_guides, &mut taa);

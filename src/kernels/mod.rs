@@ -5,10 +5,11 @@
 //!
 //! Modules know those before them: plain structures ([`vector`], [`layout`], [`frame`], [`lamps`], [`payloads`] …);
 //! what every twin is given ([`bound`], [`rays`], [`tiles`]); the families [`trace`], [`query`], [`texture`],
-//! [`shade`]; the [`table`], and [`noise`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the families the
-//! node test alone ([`trace::node`]).
+//! [`shade`]; the [`table`], [`noise`] and [`denoise`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the
+//! families the node test alone ([`trace::node`]).
 
 pub mod bound;
+pub mod denoise;
 pub mod dispatch;
 pub mod emitter_groups;
 pub mod emitters;

@@ -18,6 +18,11 @@ impl Projection {
         Self { position: camera.position, forward: camera.frame().2, basis: camera.ray_basis(width, height) }
     }
 
+    /// Where the camera stands.
+    pub fn position(&self) -> DVec3 {
+        self.position
+    }
+
     /// Pixel coordinates of what is seen in a direction, of any length; `None` behind the camera. Pixel (i, j) has its
     /// centre at (i + 0.5, j + 0.5).
     pub fn pixel_of_direction(&self, direction: DVec3) -> Option<[f64; 2]> {

@@ -41,15 +41,15 @@ struct Pool {
 impl Pool {
     /// Those that `device` takes pictures from.
     fn of(settings: &Settings, device: &Device) -> Vec<Self> {
-        let PictureBytes { device: on_device, host, band, joined } = PictureBytes::of(settings);
+        let PictureBytes { device: on_device, filter, host, band, joined } = PictureBytes::of(settings);
         let [available, local] = [cpu::available_memory(), device.local_memory()];
         let of_host = Self { what: "memory", available, whole: host, joined, band, has_cache: false };
         if device.is_host_memory() {
             let available = [available, local].into_iter().flatten().min();
-            let (whole, band) = (on_device + host, on_device + band);
+            let (whole, band) = (on_device + filter + host, on_device + band);
             return vec![Self { available, whole, band, has_cache: true, ..of_host }];
         }
-        let (whole, band) = (on_device, on_device);
+        let (whole, band) = (on_device + filter, on_device);
         vec![Self { what: "memory of the device", available: local, whole, joined: 0, band, has_cache: false }, of_host]
     }
 
@@ -159,9 +159,9 @@ fn check_within(
     available: impl FnOnce() -> Option<u64>,
 ) -> Result<()> {
     let of = |settings: &Settings| {
-        let PictureBytes { device, host, .. } = PictureBytes::of(settings);
+        let PictureBytes { device, filter, host, .. } = PictureBytes::of(settings);
         let pixels = u64::from(settings.size.width) * u64::from(settings.size.height);
-        let a_pixel = host + if is_on_host { device } else { 0 };
+        let a_pixel = host + if is_on_host { device + filter } else { 0 };
         (pixels * a_pixel, a_pixel)
     };
     let ((wanted, whole), (held, _)) = (of(settings), of(before));
@@ -184,8 +184,15 @@ mod tests {
 
     /// Memory of so many bytes, of a processor.
     fn pools(settings: &Settings, available: Option<u64>) -> [Pool; 1] {
-        let PictureBytes { device, host, band, joined } = PictureBytes::of(settings);
-        [Pool { what: "memory", available, whole: device + host, joined, band: device + band, has_cache: true }]
+        let PictureBytes { device, filter, host, band, joined } = PictureBytes::of(settings);
+        [Pool {
+            what: "memory",
+            available,
+            whole: device + filter + host,
+            joined,
+            band: device + band,
+            has_cache: true,
+        }]
     }
 
     fn bands(options: &str, available: Option<u64>) -> Result<Bands> {

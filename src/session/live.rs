@@ -114,7 +114,7 @@ impl Session {
             output => output.with_context(name)?,
         };
         let Settings { denoise, taa, exposure, tone_map, .. } = self.settings;
-        Resolve::new(denoise, taa).frame(&mut output);
+        Resolve::new(denoise, taa).frame_on(&mut self.renderer.engine, &mut output).with_context(name)?;
         let stops = Meter::new(exposure, tone_map.white()).stops(&output.pixels.radiance, &output.coverage, 0.0);
         let (size, pixels, records) = (self.renderer.size, output.pixels, output.records);
         Ok(Some(Frame { number: 0, size, pixels, records, checkpoints: Vec::new(), exposure_ev: stops, tone_map }))

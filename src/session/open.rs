@@ -312,7 +312,7 @@ impl Session {
             reference.frame(number, camera).with_context(name)?;
             note_errors(&mut output.records, renderer, reference);
         }
-        self.resolve.frame(&mut output);
+        self.resolve.frame_on(&mut renderer.engine, &mut output).with_context(name)?;
         let seconds = self.path.frame_time(self.settings.frames);
         let stops = self.meter.stops(&output.pixels.radiance, &output.coverage, seconds);
         self.stops.push(stops);

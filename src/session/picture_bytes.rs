@@ -2,8 +2,8 @@
 //! are those of one band; what is joined of all of them is on the host.
 
 use crate::frame::{Second, Seen};
-use crate::kernels::layout::{GBuffer, Hit, Ray, Surface};
-use crate::picture::denoise::Past;
+use crate::kernels::denoise;
+use crate::kernels::layout::{DenoiseGiven, DenoiseSecond, DenoiseSeen, GBuffer, Hit, Ray, Surface};
 use crate::session::Settings;
 
 /// Bytes that a pixel takes.
@@ -11,6 +11,9 @@ use crate::session::Settings;
 pub struct PictureBytes {
     /// On the device: rays, hits, surfaces, what shading keeps.
     pub device: u64,
+    /// On the device beside that, of a picture that is rendered at once: what denoising keeps. That of a joined one is
+    /// on the host.
+    pub filter: u64,
     /// On the host at most, of a picture that is rendered at once: sums of samples, what guides filters, layers of
     /// images, all while a frame is finished.
     pub host: u64,
@@ -33,8 +36,9 @@ const MEAN: u64 = 12 + 1;
 const AOVS: u64 = 32;
 /// Of the layers of an EXR, as values, by channel and compressed.
 const AOV_LAYERS: u64 = 3 * 44;
-/// Of the light of lamps, of parts of light and of pictures between the levels of a filter.
-const FILTER: u64 = 16 + 24 + 2 * 160;
+/// Of what denoising is given of a frame, with a second surface, and of what it gives back.
+const FILTER: u64 =
+    (size_of::<DenoiseSeen>() + size_of::<DenoiseGiven>() + size_of::<DenoiseSecond>()) as u64 + 16 + 32;
 /// Of radiance that is measured and sorted for an exposure; of a PNG, mapped, as bytes and compressed, no more.
 const FINISH: u64 = 12 + 4 + 4;
 
@@ -49,16 +53,17 @@ impl PictureBytes {
         let device = 2 * set + shading + 16 + bounces;
         let has_guides = settings.denoise || settings.taa;
         let guides = if has_guides { 2 * (size_of::<Seen>() + size_of::<Option<Second>>() + 12) as u64 } else { 0 };
-        let filter = if settings.denoise { 2 * size_of::<Past>() as u64 + FILTER } else { 0 };
+        let (given, filter) = if settings.denoise { (FILTER, denoise::bytes_a_pixel()) } else { (0, 0) };
         let read = if settings.aov || has_guides { set + shading } else { 0 };
         let (aovs, layers) = if settings.aov { (AOVS, AOV_LAYERS) } else { (0, 0) };
         let sums = SUMS + if settings.noise.is_some() { NOISE } else { 0 };
         let sessions = if settings.measure_error { 2 } else { 1 };
         Self {
             device: sessions * device,
-            host: sessions * sums + guides + aovs + filter.max(read).max(layers),
+            filter,
+            host: sessions * sums + guides + aovs + given.max(read).max(layers),
             band: sums + read + if has_guides { GUIDE_SUMS } else { 0 },
-            joined: MEAN + guides + aovs + filter.max(layers).max(FINISH),
+            joined: MEAN + guides + aovs + (given + filter).max(layers).max(FINISH),
         }
     }
 }
@@ -73,6 +78,7 @@ mod tests {
         let plain = of("--effects shadow");
         assert_eq!(of("--effects shadow --spp 100"), plain);
         assert!(of("--effects shadow,diffuse").device > plain.device);
+        assert!(of("--effects shadow --denoise").filter > 0 && plain.filter == 0);
         for options in ["--aov", "--denoise", "--taa"] {
             let more = of(&format!("--effects shadow {options}"));
             assert!(more.host > plain.host && more.joined > plain.joined, "{options}");

@@ -13,9 +13,10 @@ mod tests;
 
 use crate::cpu::CpuExecutor;
 use crate::gpu::executor::GpuExecutor;
+use crate::kernels::denoise;
 use crate::kernels::dispatch::dispatches;
 use crate::kernels::layout::{
-    DvfGrid, Entry, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList,
+    DenoiseSeen, DvfGrid, Entry, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList,
 };
 use crate::kernels::table::Family;
 use crate::kernels::trace::levels::spread_of;
@@ -65,6 +66,8 @@ pub enum Defect {
     LampMaps,
     /// Points of fields of visibility lie elsewhere.
     Points,
+    /// Pixels are taken for a hundredth wider by the denoiser.
+    Guides,
     /// Cones of rays that have a width of their own are wider by 1/64.
     Cones,
 }
@@ -525,6 +528,10 @@ impl FrameExecutor for Lockstep {
         if is(Defect::LampMaps, &rsm::FAMILY, rsm::MAPS) {
             let maps: &mut [RsmMap] = bytemuck::cast_slice_mut(&mut own);
             maps.iter_mut().for_each(|map| map.texel_from_point[0][3] += 1.0);
+        }
+        if is(Defect::Guides, &denoise::FAMILY, denoise::SEEN) {
+            let seen: &mut [DenoiseSeen] = bytemuck::cast_slice_mut(&mut own);
+            seen.iter_mut().for_each(|seen| seen.footprint *= 1.01);
         }
         if is(Defect::Points, &dvf::FAMILY, dvf::GRID) {
             let grids: &mut [DvfGrid] = bytemuck::cast_slice_mut(&mut own);

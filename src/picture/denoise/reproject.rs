@@ -2,47 +2,66 @@
 
 use super::grid::Grid;
 use crate::frame::{Guides, Seen};
+use crate::kernels::layout::NONE;
+use crate::scene::Projection;
 
-/// Pixels of the frame before that show a pixel's surface, with weights that sum to 1; of weight 0 are those that do
-/// not count.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Taps(pub [(usize, f32); 4]);
+/// What is kept of what a frame saw.
+#[derive(Clone, Debug)]
+pub struct Before {
+    /// Width and height, pixels.
+    pub size: (u32, u32),
+    /// The camera's picture.
+    pub projection: Projection,
+    /// Where in its pixel the first sample lies.
+    pub jitter: [f64; 2],
+    /// Pixel by pixel.
+    pub seen: Vec<Seen>,
+}
+
+/// Pixels of the frame before that show a pixel's surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Taps {
+    /// The one to the upper left: its column and, from bit 16 on, its row, both plus 1; [`NONE`]: the surface is new.
+    pub before: u32,
+    /// What that one, the next, and the two below weigh: the sum is 1, and those that do not count have 0.
+    pub shares: [f32; 4],
+}
+
+impl Default for Taps {
+    fn default() -> Self {
+        Self { before: NONE, shares: [0.0; 4] }
+    }
+}
 
 /// Least sum of bilinear weights of usable pixels.
 const LEAST_WEIGHT: f32 = 0.01;
 
-/// Bilinear weights of the four pixels around pixel coordinates (x, y), of which (i, j) has its sample at (i, j) +
-/// `jitter`.
-fn around(grid: &Grid, [x, y]: [f64; 2], jitter: [f64; 2]) -> [(Option<usize>, f32); 4] {
-    let (x, y) = (x - jitter[0], y - jitter[1]);
-    let (left, top) = (x.floor(), y.floor());
-    let (right_share, low_share) = ((x - left) as f32, (y - top) as f32);
-    // A cast saturates; pixels outside of the picture are told by `at`.
-    [0, 1, 2, 3].map(|k| {
-        let (right, low) = (k & 1, k >> 1);
-        let weight_x = if right == 1 { right_share } else { 1.0 - right_share };
-        let weight_y = if low == 1 { low_share } else { 1.0 - low_share };
-        (grid.at((left as i32).saturating_add(right), (top as i32).saturating_add(low)), weight_x * weight_y)
-    })
-}
-
-fn taps(grid: &Grid, seen: &Seen, before: &Guides) -> Option<Taps> {
+/// Where the surface of a pixel was before; `None` where it is new.
+pub fn reproject(now: &Guides, pixel: usize, before: &Before) -> Option<Taps> {
+    let seen = now.then(&now.seen[pixel]);
     if !seen.is_hit() {
         return None;
     }
+    let grid = Grid::new(now.size);
     let position = before.projection.pixel_of_point(seen.point)?;
-    let mut taps = around(grid, position, before.jitter).map(|(pixel, weight)| {
-        pixel.filter(|&p| seen.is_same_surface(&before.seen[p])).map_or((0, 0.0), |p| (p, weight))
+    // Pixel (i, j) has its sample at (i, j) + jitter.
+    let [x, y] = [0, 1].map(|k| position[k] - before.jitter[k]);
+    let (left, top) = (x.floor(), y.floor());
+    let (right_share, low_share) = ((x - left) as f32, (y - top) as f32);
+    // A cast saturates; pixels outside of the picture are told by `at`.
+    let (left, top) = (left as i32, top as i32);
+    let mut shares = [0, 1, 2, 3].map(|k| {
+        let (right, low) = (k & 1, k >> 1);
+        let weight_x = if right == 1 { right_share } else { 1.0 - right_share };
+        let weight_y = if low == 1 { low_share } else { 1.0 - low_share };
+        let there = grid.at(left.saturating_add(right), top.saturating_add(low));
+        there.filter(|&p| seen.is_same_surface(&before.seen[p])).map_or(0.0, |_| weight_x * weight_y)
     });
-    let sum: f32 = taps.iter().map(|(_, weight)| weight).sum();
+    let sum: f32 = shares.iter().sum();
     if sum < LEAST_WEIGHT {
         return None;
     }
-    taps.iter_mut().for_each(|(_, weight)| *weight /= sum);
-    Some(Taps(taps))
-}
-
-/// For every pixel where its surface was before; `None` where it is new.
-pub fn reproject(grid: &Grid, now: &Guides, before: Option<&Guides>) -> Vec<Option<Taps>> {
-    grid.map(|pixel| before.and_then(|before| taps(grid, &now.then(&now.seen[pixel]), before)))
+    shares.iter_mut().for_each(|share| *share /= sum);
+    // One of the four is in the picture: columns and rows are -1 and more.
+    Some(Taps { before: (left + 1) as u32 | ((top + 1) as u32) << 16, shares })
 }

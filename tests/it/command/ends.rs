@@ -73,10 +73,10 @@ fn pictures_take_as_much_memory_as_is_said() {
         };
         let (small, large) = (512, 1280);
         let found = (peak(large) - peak(small)) as f64 / (large * large - small * small) as f64;
-        let PictureBytes { device, host, band, joined } = PictureBytes::of(&crate::common::settings(options));
+        let PictureBytes { device, filter, host, band, joined } = PictureBytes::of(&crate::common::settings(options));
         // Bands of one row of tiles.
         let of_band = 64.0 * (device + band) as f64 / (large + small) as f64;
-        let said = if options.contains("--bands") { joined as f64 + of_band } else { (device + host) as f64 };
+        let said = if options.contains("--bands") { joined as f64 + of_band } else { (device + filter + host) as f64 };
         println!("{options}: {found:.0} bytes a pixel, said {said}");
         // Never much less than is needed; rounding of allocators and rays in flight are the rest.
         assert!((0.75..1.1).contains(&(found / said)), "{options}: {found:.0} of {said}");

@@ -167,7 +167,7 @@ fn what_is_newly_seen_is_soon_as_good_as_the_rest() {
     for k in 24..34 {
         let (guides, radiance) = denoised(&mut noisy, &mut denoiser, k, &after);
         if k == 24 {
-            let past = &denoiser.layers_mut()[1].past;
+            let past = &denoiser.past(1);
             new =
                 past.iter().zip(&guides.seen).map(|(past, seen)| seen.is_hit().then_some(past.length == 1.0)).collect();
             first = radiance.clone();

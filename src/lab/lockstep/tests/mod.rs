@@ -21,6 +21,7 @@ use crate::kernels::lamps::{Emitter, Lamps, Shape};
 use crate::kernels::layout::{MET, NONE, Params, Ray};
 use crate::kernels::table::KERNELS;
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Lod, Setup, View};
+use crate::picture::denoise::Denoiser;
 use crate::scene::{CameraPath, Keyframe};
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
@@ -111,6 +112,8 @@ struct Variant {
     bounces: u32,
     /// Noise below which pixels take no more samples.
     noise: Option<f64>,
+    /// Frames of two samples are denoised, more than the averages over a few of them have.
+    denoises: bool,
 }
 
 const VARIANT: Variant = Variant {
@@ -133,6 +136,7 @@ const VARIANT: Variant = Variant {
     lod: Lod { pixels: 0.0, blend: false, angle: 0.0, given: false },
     bounces: 1,
     noise: None,
+    denoises: false,
 };
 
 fn effects() -> Effects {
@@ -283,7 +287,7 @@ fn render(
             }),
             schedule: variant.schedule,
             effects: Effects { bounces: variant.bounces, ..effects() },
-            samples: if variant.noise.is_some() { LEAST + 1 } else { 1 },
+            samples: if variant.noise.is_some() { LEAST + 1 } else { 1 + u32::from(variant.denoises) },
             noise: variant.noise,
             seed: 3,
             tracing,
@@ -337,15 +341,23 @@ fn render(
         };
         renderer.methods.set(Dvf::new(Arc::new(made.field), how).renewed_by(renewal));
     }
-    for frame in 0..2 {
+    let mut denoiser = Denoiser::default();
+    for frame in 0..if variant.denoises { 8 } else { 2 } {
         // The second frame scatters directions, and an instance has moved.
-        renderer.settings.guides = frame == 1;
+        renderer.settings.guides = frame == 1 || variant.denoises;
         if let Some(instance) = scene.resident().instances.get(1).filter(|_| frame == 1) {
             let mut matrix = instance.world_from_object;
             matrix[3] += 0.1 * (manifest.max[0] - manifest.min[0]);
             assert_eq!(renderer.place(scene, &[(1, matrix)]), Ok(vec![1]));
         }
-        let output = renderer.frame(frame, &path.frame(4 * frame, 12)).unwrap();
+        let camera = if variant.denoises { path.frame(frame, 100) } else { path.frame(4 * frame, 12) };
+        let mut output = renderer.frame(frame, &camera).unwrap();
+        if variant.denoises {
+            let (guides, engine) = (output.guides.take().unwrap(), &mut renderer.engine);
+            let radiance = &mut output.pixels.radiance;
+            let lost = denoiser.frame_on(&mut *engine.executor, &engine.cache.states, guides, radiance);
+            assert_eq!(lost.unwrap(), 0);
+        }
         let renewed = output.records.iter().find(|record| record.pass == "dvf");
         if renderer.methods.get::<Dvf>().is_some_and(|dvf| dvf.moved_field().is_some()) {
             assert!(renewed.is_some_and(|record| record.cells_renewed > 0 && record.rays() > 0), "{renewed:?}");
@@ -377,6 +389,8 @@ fn twins_agree_with_their_kernels() {
         // Some blocks stop, and some go on.
         Variant { noise: Some(0.05), everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { noise: Some(0.1), everything_fits: true, ..VARIANT },
+        Variant { denoises: true, everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
+        Variant { denoises: true, bounces: 2, ..VARIANT },
         Variant { bounces: 4, everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { half_rate: true, clip: Some(DVec3::Y), schedule: Schedule::Demand, ..VARIANT },
         Variant { hides: 7, ..VARIANT },
@@ -501,6 +515,7 @@ fn a_twin_that_differs_is_noticed() {
         (Defect::LampMaps, &plain, "radiance"),
         (Defect::Points, &plain, "rays of points"),
         (Defect::Cones, &levelled, "spreads"),
+        (Defect::Guides, &opaque, "past"),
     ];
     for (defect, scene, what) in cases {
         let findings = Arc::new(Mutex::new(Findings::default()));
@@ -509,7 +524,9 @@ fn a_twin_that_differs_is_noticed() {
         // Points of the set of Hammersley have no seed but for how their rays are turned.
         let dvf = (defect == Defect::Points).then(|| visibility(8));
         let lod = Lod { pixels: if defect == Defect::Cones { 4.0 } else { 0.0 }, ..Lod::default() };
-        let variant = Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, dvf, lod, ..VARIANT };
+        let denoises = defect == Defect::Guides;
+        let variant =
+            Variant { schedule: Schedule::Plain, everything_fits: true, roma, field, dvf, lod, denoises, ..VARIANT };
         render(&device, scene, &variant, Some(defect), &findings);
         let found = findings.lock().unwrap();
         assert!(found.differences.iter().any(|line| line.contains(what)), "{defect:?}: {:?}", found.differences);
