@@ -357,18 +357,29 @@ fn bounces(
     }
     for (number, names) in (2..=count).zip(&*PATHS) {
         let of_lamp = to_lamps(number);
-        let mut rays = 0;
+        let (mut rays, mut lit) = (0, Vec::new());
         records.pass(engine, names[0], |r, stats| {
+            let path = Pass::Path(number);
+            let plan = methods.plan(r, path)?;
+            stats.methods.add(&plan.methods);
             stats.add(r.executor.run(Pass::PathShadow(Lamp::Sun), &[Step::Continue(number)], &r.cache.states)?);
             let before = stats.rays_traced;
-            r.trace(frame, Pass::Path(number), [&[], &[]], stats)?;
-            rays = stats.rays_traced - before;
-            r.resolve(Pass::Path(number), stats)?;
+            r.trace(frame, path, [&plan.before, &[]], stats)?;
+            (rays, lit) = (stats.rays_traced - before, plan.light);
+            r.note_answers(path, false)?;
+            r.resolve(path, stats)?;
             let (shadow, environment) = (r.settings.effects.shadow, r.draws_environment());
             // What lamps bring to the hits before is weighted where these rays meet it.
             let shading = Shading { sun: !shadow, sky: false, emission: true, miss: true, environment, gloss: true };
             r.shade(of_lamp(Lamp::Sun), shading, stats)
         })?;
+        if !lit.is_empty() {
+            // What methods met: paths end there.
+            records.pass(engine, names[1], |r, stats| {
+                stats.add(r.executor.run(of_lamp(Lamp::Sun), &lit, &r.cache.states)?);
+                Ok(())
+            })?;
+        }
         if rays == 0 {
             // All paths have ended.
             break;

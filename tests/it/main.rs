@@ -87,6 +87,7 @@ mod secondary {
     mod dvf;
     mod dvf_paper;
     mod dvf_renew;
+    mod paths;
     mod roma;
     mod roma_diffuse;
 }
