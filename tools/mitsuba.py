@@ -102,7 +102,7 @@ def diffuse_sponza(scenes, out):
 def accessor(document, data, index):
     a = document["accessors"][index]
     view = document["bufferViews"][a["bufferView"]]
-    width = {"SCALAR": 1, "VEC3": 3}[a["type"]]
+    width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[a["type"]]
     kind = np.dtype(COMPONENT[a["componentType"]])
     stride = view.get("byteStride", width * kind.itemsize)
     start = view.get("byteOffset", 0) + a.get("byteOffset", 0)

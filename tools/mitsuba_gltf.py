@@ -9,7 +9,9 @@ docs/methods/light.md: GGX with Smith's correlated masking, Fresnel by Schlick, 
 facets (Turquin 2019), what the diffuse part has left, a clear coat, and facets that refract. What facets reflect of
 light from everywhere is integrated here, by quadrature. Scenes are generated: spheres over roughness of metal, of
 plastic and of coated things, glass, rough glass, glass beside metal, a box with a lamp, a room that is lit through a
-door, and a chain of instances. Each is rendered with so many bounces as --bounces has.
+door, and a chain of small spheres. `mtl` is written as an OBJ file with a library of materials, and `teapots` is the
+file of that name, its 1,899 instances made one mesh for Mitsuba. Each is rendered with so many bounces as --bounces
+has.
 
 A row of the table is a picture, as in tools/mitsuba.py. The exit status is 1 where means differ by more than half a
 percent and by more than three standard errors, and with --control where they do not: `roughness` and `index` tell
@@ -314,12 +316,102 @@ SCENES = {
         "env",
         VIEW,
     ),
+    "mtl": (
+        [
+            *walls(),
+            # Faces of OBJ files have two sides, so the lamp is closed.
+            (sphere((0, 1.4, 0), 0.35, 16), {"base": (0, 0, 0), "weight": 0.0, "emission": 12.0}),
+            (sphere((-1.1, -1.3, -0.5), 0.7, 96), {**METAL, "roughness": 0.3}),
+            (sphere((0.0, -1.4, 0.7), 0.6, 96), {**PLASTIC, "roughness": 0.4, "exponent": True}),
+            (sphere((1.1, -1.3, -0.3), 0.7, 96), {**PLASTIC, "roughness": 0.6, "coat": 1.0, "coat_roughness": 0.2}),
+        ],
+        None,
+        ((0, 0, 7), (0, 0, 0), 40),
+    ),
+    # Its own camera.
+    "teapots": (None, "env", ((0, 20, 0), (0, 19.7126521, -0.9578263), 46.8265)),
 }
 
 
-def gltf(parts, view, folder):
-    """The scene as a glTF file, and its camera path."""
-    folder.mkdir(parents=True, exist_ok=True)
+def path_file(view, folder):
+    """The camera path."""
+    position, target, fov = view
+    keyframe = {"time": 0, "position": position, "target": target}
+    (folder / "path.json").write_text(json.dumps({"fov_y_degrees": fov, "up": [0, 1, 0], "keyframes": [keyframe]}))
+
+
+def obj(parts, folder):
+    """The scene as an OBJ file with a library of materials. Returns its path.
+
+    Matt materials have `illum 1`, metals and plastics roughness (Pr) or an exponent (Ns), whose lobe is as wide where
+    the square of the roughness is the root of 2 / (Ns + 2).
+    """
+    lines, library, count = ["mtllib scene.mtl"], [], 1
+    for number, ((positions, normals, triangles), m) in enumerate(parts):
+        lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in positions]
+        lines += [f"vn {x:.9g} {y:.9g} {z:.9g}" for x, y, z in normals]
+        lines.append(f"usemtl {number}")
+        lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in triangles + count]
+        count += len(positions)
+        library += [f"newmtl {number}", "Kd {} {} {}".format(*m["base"])]
+        if "emission" in m:
+            library.append("Ke {0} {0} {0}".format(m["emission"]))
+        if "weight" in m:
+            library.append("illum 1")
+        elif m.get("exponent"):
+            library += ["illum 2", "Ks 0.04 0.04 0.04", f"Ns {2 / m['roughness'] ** 4 - 2}"]
+        else:
+            library += ["illum 2", "Ks 1 1 1", "Ni 1.5", f"Pr {m['roughness']}", f"Pm {m.get('metallic', 0)}"]
+            library += [f"Pc {m.get('coat', 0)}", f"Pcr {m.get('coat_roughness', 0)}"]
+    (folder / "scene.mtl").write_text("\n".join(library) + "\n")
+    (folder / "scene.obj").write_text("\n".join(lines) + "\n")
+    return folder / "scene.obj"
+
+
+def teapots(scenes):
+    """The parts of TeapotsGalore.gltf, each instance where it stands."""
+    helpers = beside("mitsuba.py")
+    folder = scenes / "teapots_instanced"
+    document = json.loads((folder / "TeapotsGalore.gltf").read_text())
+    data = [(folder / buffer["uri"]).read_bytes() for buffer in document["buffers"]]
+    parts = []
+
+    def array(index):
+        buffer = document["bufferViews"][document["accessors"][index]["bufferView"]]["buffer"]
+        return helpers.accessor(document, data[buffer], index).astype(np.float64)
+
+    def visit(index, above):
+        node = document["nodes"][index]
+        world = above @ helpers.matrix(node)
+        places = [np.eye(4)]
+        instances = node.get("extensions", {}).get("EXT_mesh_gpu_instancing")
+        if instances:
+            columns = {name.lower(): array(i).tolist() for name, i in instances["attributes"].items()}
+            rows = (dict(zip(columns, values)) for values in zip(*columns.values()))
+            places = [helpers.matrix(row) for row in rows]
+        if "mesh" in node:
+            (primitive,) = document["meshes"][node["mesh"]]["primitives"]
+            positions, normals = (array(primitive["attributes"][name]) for name in ("POSITION", "NORMAL"))
+            triangles = array(primitive["indices"]).astype(int).reshape(-1, 3)
+            matrices = [world @ place for place in places]
+            moved = [positions @ m[:3, :3].T + m[:3, 3] for m in matrices]
+            turned = [normals @ np.linalg.inv(m[:3, :3]) for m in matrices]
+            turned = [n / np.linalg.norm(n, axis=1, keepdims=True) for n in turned]
+            indices = [triangles + i * len(positions) for i in range(len(places))]
+            surface = document["materials"][primitive["material"]]["pbrMetallicRoughness"]
+            material = {"base": surface["baseColorFactor"][:3], "metallic": surface["metallicFactor"]}
+            material["roughness"] = surface["roughnessFactor"]
+            parts.append((tuple(map(np.concatenate, (moved, turned, indices))), material))
+        for child in node.get("children", ()):
+            visit(child, world)
+
+    for root in document["scenes"][0]["nodes"]:
+        visit(root, np.eye(4))
+    return parts
+
+
+def gltf(parts, folder):
+    """The scene as a glTF file. Returns its path."""
     blob, views, accessors, primitives, materials = b"", [], [], [], []
 
     def add(array, kind, component):
@@ -375,9 +467,7 @@ def gltf(parts, view, folder):
     }
     (folder / "scene.bin").write_bytes(blob)
     (folder / "scene.gltf").write_text(json.dumps(document))
-    position, target, fov = view
-    keyframe = {"time": 0, "position": position, "target": target}
-    (folder / "path.json").write_text(json.dumps({"fov_y_degrees": fov, "up": [0, 1, 0], "keyframes": [keyframe]}))
+    return folder / "scene.gltf"
 
 
 def theirs(parts, environment, view, bounces, control):
@@ -436,9 +526,14 @@ def main():
         parts, light, view = SCENES[case]
         environment = options.scenes / "env" / "venice_sunset_1k.hdr" if light else None
         folder = options.output / case
-        gltf(parts, view, folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        path_file(view, folder)
+        if case == "teapots":
+            parts, model = teapots(options.scenes), options.scenes / "teapots_instanced" / "TeapotsGalore.gltf"
+        else:
+            model = (obj if case == "mtl" else gltf)(parts, folder)
         bricks = folder / "scene.bricks"
-        words = [options.brickwalk, "convert", folder / "scene.gltf", "-o", bricks, "-q"]
+        words = [options.brickwalk, "convert", model, "-o", bricks, "-q"]
         subprocess.run([str(word) for word in words], check=True)
         for bounces in map(int, options.bounces.split(",")):
             own = folder / f"ours-{bounces}-{options.spp}"
