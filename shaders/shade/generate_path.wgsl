@@ -1,8 +1,8 @@
 // One ray from every hit of the shaded set, which a path goes on by, in a direction drawn by what the surface reflects:
 // around the normal by its diffuse part, else by its gloss, which may lead through it. The throughput is what was
 // carried so far times what is reflected, and the density by which the direction was drawn is noted. From the third ray
-// on, paths that lose light end by chance, and what goes on makes up for them (Russian roulette: Arvo, Kirk 1990). Then
-// this set is moved to that before it.
+// on, paths that lose light end by chance, and what goes on makes up for them (Russian roulette: Arvo, Kirk 1990). Where
+// paths end at these hits, those alone go on that lead through them. Then this set is moved to that before it.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
@@ -42,7 +42,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         if !is_through {
             density = path_density(s, g.normal, ray.direction);
         }
-        if density > 0.0 && (dot(surface.normal, ray.direction) > 0.0) != is_through {
+        let goes_on = is_through || (params.flags & PARAM_PATH) != 0u;
+        if goes_on && density > 0.0 && (dot(surface.normal, ray.direction) > 0.0) != is_through {
             var weight: vec3<f32>;
             var scale = 1.0;
             if is_through {

@@ -34,7 +34,8 @@ pub fn run(args: &DemoArgs) -> Result<()> {
         seed: args.seed,
         adapter: args.adapter.clone(),
         ..Settings::default()
-    };
+    }
+    .for_pictures();
     step("walk through it out of core", &format!("walk {name} -o {output} {}", settings.options()))?;
     let records = walk::walk(&file, &args.output, &settings, false)?;
     let scene = SceneFile::open(&file)?;

@@ -7,7 +7,7 @@ use super::half_rate;
 use super::noise::{LEAST, Noise};
 use super::{
     Accumulation, BATCH_SAMPLES, Effects, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState,
-    Pixels, camera_view,
+    Pixels, Plan, camera_view,
 };
 use crate::counters::{Counters, Record};
 use crate::kernels::Lod;
@@ -15,6 +15,7 @@ use crate::kernels::layout::{GBuffer, Hit, NONE, Ray, Surface};
 use crate::math::sampling::pixel_jitter;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass, Shading, Step};
+use bricks::MATERIAL_REFRACTS;
 use std::ops::{Deref, DerefMut};
 use std::sync::LazyLock;
 use thiserror::Error;
@@ -338,11 +339,12 @@ impl Band<'_> {
 /// What the rays of bounces from the second on count for, those to lamps, and those to the environment.
 static PATHS: LazyLock<Vec<[&'static str; 3]>> = LazyLock::new(|| {
     let name = |number: u32, of: &str| &*format!("bounce-{number}{of}").leak();
-    (2..=Effects::MOST_BOUNCES).map(|number| ["", "-shadow", "-environment"].map(|of| name(number, of))).collect()
+    (2..=Effects::MOST_BOUNCES + 1).map(|number| ["", "-shadow", "-environment"].map(|of| name(number, of))).collect()
 });
 
 /// Traces rays from primary hits, and as many bounces from theirs as are asked for: `names` are the effects that the
-/// first counts for, as in [`light`] and [`light_environment`].
+/// first counts for, as in [`light`] and [`light_environment`]. From the last hits light through facets is followed by
+/// one more ray, as no ray to a lamp brings it; what that meets shows its emission alone.
 fn bounces(
     engine: &mut Engine,
     methods: &mut Methods,
@@ -355,14 +357,20 @@ fn bounces(
     if !bounce(engine, methods, records, names, pass, to_lamps(1))? {
         return Ok(());
     }
-    for (number, names) in (2..=count).zip(&*PATHS) {
-        let of_lamp = to_lamps(number);
+    let bends = |engine: &Engine| {
+        let materials = &engine.scene.resident().materials;
+        engine.settings.effects.refracts() && materials.iter().any(|m| m.flags & MATERIAL_REFRACTS != 0)
+    };
+    let last = if bends(engine) { count + 1 } else { count };
+    for (number, names) in (2..=last).zip(&*PATHS) {
+        let (of_lamp, is_lit) = (to_lamps(number), number <= count);
         let (mut rays, mut lit) = (0, Vec::new());
         records.pass(engine, names[0], |r, stats| {
             let path = Pass::Path(number);
-            let plan = methods.plan(r, path)?;
+            let plan = if is_lit { methods.plan(r, path)? } else { Plan::exact(path) };
             stats.methods.add(&plan.methods);
-            stats.add(r.executor.run(Pass::PathShadow(Lamp::Sun), &[Step::Continue(number)], &r.cache.states)?);
+            let from = if is_lit { Pass::PathShadow } else { Pass::BounceShadow };
+            stats.add(r.executor.run(from(Lamp::Sun), &[Step::Continue(number)], &r.cache.states)?);
             let before = stats.rays_traced;
             r.trace(frame, path, [&plan.before, &[]], stats)?;
             (rays, lit) = (stats.rays_traced - before, plan.light);
@@ -370,7 +378,8 @@ fn bounces(
             r.resolve(path, stats)?;
             let (shadow, environment) = (r.settings.effects.shadow, r.draws_environment());
             // What lamps bring to the hits before is weighted where these rays meet it.
-            let shading = Shading { sun: !shadow, sky: false, emission: true, miss: true, environment, gloss: true };
+            let shading =
+                Shading { sun: is_lit && !shadow, sky: false, emission: true, miss: true, environment, gloss: true };
             r.shade(of_lamp(Lamp::Sun), shading, stats)
         })?;
         if !lit.is_empty() {
@@ -380,7 +389,7 @@ fn bounces(
                 Ok(())
             })?;
         }
-        if rays == 0 {
+        if rays == 0 || !is_lit {
             // All paths have ended.
             break;
         }

@@ -113,13 +113,15 @@ settings! {
         /// Radiance of the rectangular light.
         rect_light_intensity: f64 = 10.0, "--rect-light-intensity X", Rule::Real(0.0, ANY), "", Light, Expert;
 
-        /// What pictures are made for: draft, preview, high, exact. It stands for other settings, which
-        /// --print-settings shows, and single options win over it. `draft`: the sun's shadows alone, one sample.
-        /// `preview`: the defaults. `high`: all light, eight bounces, 16 samples, denoised. `exact`: one camera ray and
-        /// one shadow ray a pixel, without exposure and tone map, for measurements. On two cores a frame of 1280x720 of
-        /// a city takes 0.5 s, 2 s, 90 s and 0.3 s, one of Sponza 2 s, 9 s, 5 min and 2 s. Hits are exact with all of
-        /// them.
-        quality: Quality = Quality::Preview, "--quality NAME", Rule::Any, "", Quality, Common;
+        /// What pictures are made for: auto, draft, preview, high, exact. It stands for other settings, which
+        /// --print-settings shows, and single options win over it. `draft`: sun and ambient occlusion, four samples.
+        /// `preview`: sun and sky by two bounces, four samples, denoised. `high`: all light, eight bounces, 16 samples,
+        /// denoised. `exact`: one camera ray and one shadow ray a pixel, without exposure and tone map, for
+        /// measurements. `auto`: `preview` for `walk` and `demo`; `draft` for the others, where options choose effects,
+        /// samples, methods or measurements, and for pictures of more than 8 million pixels. On two cores a frame of
+        /// 1280x720 of a city takes 2 s, 15 s, 90 s and 0.3 s, one of Sponza 9 s, 45 s, 5 min and 2 s. Hits are exact
+        /// with all of them.
+        quality: Quality = Quality::Auto, "--quality NAME", Rule::Any, "", Quality, Common;
         /// Samples per pixel. Beyond 64 they are summed in f64.
         spp: u32 = 4, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
         /// Noise at which a pixel takes no more samples: the standard error of its mean as a part of that, as 0.02.

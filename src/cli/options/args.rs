@@ -473,7 +473,7 @@ impl WalkArgs {
     /// # Errors
     /// A bad file; settings that do not go together.
     pub fn settings(&self) -> anyhow::Result<Settings> {
-        let settings = self.given.over(self.file.as_deref())?;
+        let settings = self.given.over(self.file.as_deref())?.for_pictures();
         settings.check().map_err(usage)?;
         Ok(settings)
     }
@@ -510,7 +510,7 @@ impl ViewSettings {
     /// # Errors
     /// A bad file; settings that do not go together.
     pub fn settings(&self) -> anyhow::Result<Settings> {
-        let settings = self.given.over(self.file.as_deref())?;
+        let settings = self.given.over(self.file.as_deref())?.for_windows();
         settings.check().map_err(usage)?;
         Ok(settings)
     }

@@ -7,7 +7,7 @@ use super::lamps::unit;
 use super::random::tangent;
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Ray, T_INFINITE, UNSHARED};
+use crate::kernels::layout::{PARAM_PATH, Ray, T_INFINITE, UNSHARED};
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, least, most, most3, normalize};
 use crate::math::sampling::{pcg, points4};
@@ -78,7 +78,8 @@ pub fn generate_path(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mu
         let density = if drawn.is_through { UNSHARED } else { s.path_density(g.normal, direction) };
         let ended = Ray { direction, ..none(surface.point) };
         let mut step = Step { ray: ended, weight: [0.0; 3], density, alpha: 0.0 };
-        if density > 0.0 && (dot(surface.normal, direction) > 0.0) != drawn.is_through {
+        let goes_on = drawn.is_through || bound.has(PARAM_PATH);
+        if goes_on && density > 0.0 && (dot(surface.normal, direction) > 0.0) != drawn.is_through {
             let (mut weight, mut scale);
             if drawn.is_through {
                 weight = s.passed(direction).map(|c| c / s.path_choice());

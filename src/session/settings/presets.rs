@@ -1,14 +1,17 @@
 //! Presets: what `--quality` names, and the settings that each stands for.
 
-use crate::settings::{Plain, Rule, Value};
+use super::Settings;
+use crate::settings::{Entry, Group, Heading, Plain, Rule, Value};
 use std::fmt;
 
 /// What pictures are made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
-    /// To find one's way: the fastest picture of the scene.
+    /// One of the others, by what else is chosen: [`Settings::for_pictures`].
+    Auto,
+    /// To find one's way: the sun, and occlusion of the sky.
     Draft,
-    /// To be looked at; what all settings are by default.
+    /// To be looked at: the light of two bounces, without the noise of few samples.
     Preview,
     /// To be shown: all light, and many samples.
     High,
@@ -20,9 +23,20 @@ pub enum Quality {
 type Preset = (Quality, &'static str, &'static [(&'static str, &'static str)]);
 
 /// All of them, in the order of [`Quality`].
-const PRESETS: [Preset; 4] = [
-    (Quality::Draft, "draft", &[("effects", "primary,shadow"), ("spp", "1")]),
-    (Quality::Preview, "preview", &[]),
+const PRESETS: [Preset; 5] = [
+    (Quality::Auto, "auto", &[]),
+    (Quality::Draft, "draft", &[]),
+    (
+        Quality::Preview,
+        "preview",
+        &[
+            ("effects", "shadow,diffuse,environment"),
+            ("diffuse_rays", "1"),
+            ("bounces", "2"),
+            ("spp", "4"),
+            ("denoise", "on"),
+        ],
+    ),
     (Quality::High, "high", &[("effects", "path"), ("diffuse_rays", "1"), ("spp", "16"), ("denoise", "on")]),
     (
         Quality::Exact,
@@ -44,6 +58,40 @@ const PRESETS: [Preset; 4] = [
     ),
 ];
 
+/// Settings beside those of effects, methods and measurements with which pictures are what these say, and no more.
+const OWN: [&str; 7] = ["spp", "noise", "denoise", "taa", "lod_correct", "frame_budget", "interactive"];
+
+/// The filter takes about 700 bytes a pixel of the host's memory.
+const MOST_PIXELS: u64 = 1 << 23;
+
+impl Settings {
+    /// These settings with `draft` in the place of [`Quality::Auto`], so that options that are told stand for what is
+    /// shown.
+    pub fn for_windows(&self) -> Self {
+        let quality = if self.quality == Quality::Auto { Quality::Draft } else { self.quality };
+        Self { quality, ..self.clone() }
+    }
+
+    /// These settings with a preset in the place of [`Quality::Auto`]: `preview`, or `draft` where single settings
+    /// choose effects, samples, methods or measurements, and where a picture has more than 8,388,608 pixels.
+    pub fn for_pictures(&self) -> Self {
+        let mut settled = self.clone();
+        if self.quality == Quality::Auto {
+            let is_own = |entry: &Entry| {
+                let heading = entry.field.heading;
+                matches!(heading, Heading::Effects | Heading::Methods | Heading::Measurement)
+                    || OWN.contains(&entry.field.key)
+            };
+            let is_large = u64::from(self.size.width) * u64::from(self.size.height) > MOST_PIXELS;
+            let is_draft = is_large || self.chosen().iter().any(is_own);
+            let preset = if is_draft { Quality::Draft } else { Quality::Preview };
+            // What a preset sets are values, as a test shows.
+            let _ = settled.set("quality", preset.name());
+        }
+        settled
+    }
+}
+
 impl Quality {
     fn preset(self) -> &'static Preset {
         &PRESETS[self as usize]
@@ -62,7 +110,7 @@ impl fmt::Display for Quality {
 }
 
 impl Value for Quality {
-    const NAMES: &'static [&'static str] = &[PRESETS[0].1, PRESETS[1].1, PRESETS[2].1, PRESETS[3].1];
+    const NAMES: &'static [&'static str] = &[PRESETS[0].1, PRESETS[1].1, PRESETS[2].1, PRESETS[3].1, PRESETS[4].1];
     const IS_PRESET: bool = true;
 
     fn read(text: &str, _: Rule, _: &str) -> Result<Self, String> {
@@ -82,8 +130,7 @@ impl Value for Quality {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::session::Settings;
-    use crate::settings::{EffectList, Group};
+    use crate::settings::EffectList;
 
     #[test]
     fn presets_set_values_and_stand_in_their_order() {
@@ -101,8 +148,36 @@ mod tests {
         assert_eq!(Settings::from_options("--quality exact"), Ok(Settings::exact()));
         assert_eq!(Settings::exact().options(), "--quality exact");
         assert!(
-            Settings::from_options("--quality best").unwrap_err().to_string().contains("draft, preview, high, exact")
+            Settings::from_options("--quality best")
+                .unwrap_err()
+                .to_string()
+                .contains("auto, draft, preview, high, exact")
         );
+    }
+
+    #[test]
+    fn pictures_look_finished_unless_single_settings_say_what_they_are() {
+        let found = |options: &str| Settings::from_options(options).unwrap().for_pictures();
+        for options in ["", "--cache 20% --size 640x360", "--environment none --sun 0,1,0", "--schedule chc --bands 4"]
+        {
+            let settings = found(options);
+            assert!(settings.quality == Quality::Preview && settings.denoise && settings.effects.diffuse, "{options}");
+            let named = Settings::from_options(&format!("--quality preview {options}")).unwrap();
+            assert_eq!(settings, named, "{options}");
+            assert_eq!(Settings::from_options(&settings.options()), Ok(settings), "{options}");
+        }
+        for options in
+            ["--effects shadow", "--spp 16", "--secondary roma", "--measure-needed", "--frame-budget 8M", "--ao-rays 8"]
+        {
+            let settings = found(options);
+            let named = Settings::from_options(&format!("--quality draft {options}")).unwrap();
+            assert_eq!(settings, named, "{options}");
+            assert!(settings.quality == Quality::Draft && !settings.denoise, "{options}");
+        }
+        assert_eq!(found("--size 8192x8192").quality, Quality::Draft);
+        for name in ["draft", "high", "exact"] {
+            assert_eq!(found(&format!("--quality {name}")).quality.name(), name);
+        }
     }
 
     #[test]

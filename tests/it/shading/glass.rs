@@ -51,6 +51,26 @@ fn a_slab_reflects_absorbs_and_passes_as_its_series() {
     }
 }
 
+/// With so many bounces as many ways within the slab are followed, the last by a ray through its facets.
+#[test]
+fn the_last_bounce_shows_what_lies_behind_glass() {
+    let folder = common::folder();
+    let folder = folder.path();
+    let view = path(folder, "ahead", 2.0, [0.0, 0.0, 30.0], [0.0; 3]);
+    let light = even(folder);
+    let index = 2.4f64;
+    let scene = converted(folder, "slab", &glass(index, 0.0, 1.0), &cube());
+    let f = ((index - 1.0) / (index + 1.0)).powi(2);
+    let expected = |ways: i32| f + (0..ways).map(|k| (1.0 - f) * (1.0 - f) * f.powi(k)).sum::<f64>();
+    for bounces in [2, 3, 4] {
+        let options = format!("{light} --spp 1024 --effects path --diffuse-rays 1 --bounces {bounces}");
+        let found = mean(&render(&scene, &view, &options));
+        println!("{bounces}: {found}, {}", expected(bounces));
+        assert!((found - expected(bounces)).abs() < 0.004, "{bounces}: {found} instead of {}", expected(bounces));
+    }
+    assert!(expected(2) - expected(1) > 0.1 && expected(3) - expected(2) > 0.015, "control");
+}
+
 /// Light that enters a white body leaves it: nothing is lost but between facets of rough ones, and nothing is gained.
 #[test]
 fn clear_glass_vanishes_in_a_uniform_environment() {
