@@ -3,6 +3,7 @@
 //! Every record is `#[repr(C)]`, little-endian, without implicit padding and valid for every bit pattern; what its
 //! values must satisfy is checked by [`crate::validate`] before anything indexes with them.
 
+use crate::layers::{MATERIAL_ANISOTROPIC, MATERIAL_LAYERS};
 use bytemuck::{Pod, Zeroable};
 
 /// "No such thing", in every index field that may be absent.
@@ -330,7 +331,8 @@ pub struct Material {
     /// What a body that refracts takes from light (KHR_materials_volume), as [`pack_absorption`] has it; else zero.
     pub absorption: u32,
     /// Two rows a texture: of the set's coordinates (s, t) the coordinate is a s + b t + c by a row (a, b, c, d). The
-    /// fourth of the first row is the absolute determinant, by which areas grow; of the second row it is zero.
+    /// fourth of the first row is the absolute determinant, by which areas grow. Those of the second rows are words of
+    /// [`crate::Layers`], zero without [`crate::MATERIAL_LAYERS`].
     pub uv_from_set: [[f32; 4]; 2 * MATERIAL_TEXTURES],
 }
 
@@ -395,12 +397,16 @@ impl Material {
     /// Whether it reflects in another way than a Lambertian surface.
     pub fn is_glossy(&self) -> bool {
         let is_unlit = self.flags & MATERIAL_UNLIT != 0;
-        !is_unlit && (self.metallic > 0.0 || self.specular_weight > 0.0 || self.clearcoat > 0.0)
+        !is_unlit
+            && (self.metallic > 0.0
+                || self.specular_weight > 0.0
+                || self.clearcoat > 0.0
+                || self.flags & MATERIAL_LAYERS != 0)
     }
 
     /// Whether its triangles need [`AttributeDetail`]s.
     pub fn needs_details(&self) -> bool {
-        self.normal_texture != NONE || self.uv_sets != 0
+        self.normal_texture != NONE || self.uv_sets != 0 || self.flags & MATERIAL_ANISOTROPIC != 0
     }
 }
 

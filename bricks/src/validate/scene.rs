@@ -2,6 +2,7 @@
 
 use super::rule::{length, rule};
 use crate::error::{Flaw, Part};
+use crate::layers::{MATERIAL_ANISOTROPIC, MATERIAL_LAYERS};
 use crate::layout::Section;
 use crate::levels::Level;
 use crate::payload::Payload;
@@ -184,6 +185,7 @@ pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
         })?;
         let both = MATERIAL_MASK | MATERIAL_BLEND;
         let known = both | MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT | MATERIAL_REFRACTS;
+        let known = known | MATERIAL_LAYERS | MATERIAL_ANISOTROPIC;
         rule(material.flags & !known == 0 && material.flags & both != both, part, || {
             (format!("flags {:#x}", material.flags), "known flags, not both MASK and BLEND")
         })?;
@@ -209,10 +211,17 @@ pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
         })?;
         for [u, v] in material.uv_from_set.as_chunks::<2>().0 {
             let finite = u.iter().chain(v).all(|value| value.is_finite());
-            rule(finite && u[3] >= 0.0 && v[3] == 0.0, part, || {
-                (format!("coordinates by {u:?}, {v:?}"), "finite numbers, the fourth of them a determinant and zero")
+            rule(finite && u[3] >= 0.0, part, || {
+                (format!("coordinates by {u:?}, {v:?}"), "finite numbers, the fourth of the first a determinant")
             })?;
         }
+        rule(material.has_sound_layers(), part, || {
+            let words: Vec<f32> = material.uv_from_set.iter().skip(1).step_by(2).map(|row| row[3]).collect();
+            (
+                format!("flags {:#x} and words of layers {words:?}", material.flags),
+                "words of 24 bits that the flags name",
+            )
+        })?;
         let map = material.opacity_map;
         rule(map == NONE || (map as usize) < resident.opacity_maps.len(), part, || {
             (format!("opacity map {map}"), format!("none or less than {}", resident.opacity_maps.len()))

@@ -90,7 +90,12 @@ fn materials() {
         }
     }
     material("coordinates by", |m| m.uv_from_set[2 * EMISSIVE][3] = -1.0);
-    material("coordinates by", |m| m.uv_from_set[2 * EMISSIVE + 1][3] = 1.0);
+    material("words of layers", |m| m.uv_from_set[2 * EMISSIVE + 1][3] = 1.0);
+    material("words of layers", |m| m.flags |= bricks::MATERIAL_LAYERS);
+    material("words of layers", |m| {
+        m.flags |= bricks::MATERIAL_LAYERS;
+        m.uv_from_set[1][3] = 0.5;
+    });
 }
 
 #[test]
