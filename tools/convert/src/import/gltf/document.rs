@@ -337,6 +337,12 @@ pub(super) struct MaterialExtensions {
     pub specular: Option<Specular>,
     #[serde(rename = "KHR_materials_clearcoat")]
     pub clearcoat: Option<Clearcoat>,
+    #[serde(rename = "KHR_materials_sheen")]
+    pub sheen: Option<Sheen>,
+    #[serde(rename = "KHR_materials_anisotropy")]
+    pub anisotropy: Option<Anisotropy>,
+    #[serde(rename = "KHR_materials_iridescence")]
+    pub iridescence: Option<Iridescence>,
     #[serde(rename = "KHR_materials_transmission")]
     pub transmission: Option<Transmission>,
     #[serde(rename = "KHR_materials_volume")]
@@ -417,6 +423,27 @@ optional! {
         clearcoat_roughness_factor: f64,
         clearcoat_roughness_texture: IgnoredAny,
         clearcoat_normal_texture: IgnoredAny,
+    }
+    /// KHR_materials_sheen.
+    Sheen {
+        sheen_color_factor: [f64; 3],
+        sheen_color_texture: IgnoredAny,
+        sheen_roughness_factor: f64,
+        sheen_roughness_texture: IgnoredAny,
+    }
+    /// KHR_materials_anisotropy.
+    Anisotropy {
+        anisotropy_strength: f64,
+        anisotropy_rotation: f64,
+        anisotropy_texture: IgnoredAny,
+    }
+    /// KHR_materials_iridescence.
+    Iridescence {
+        iridescence_factor: f64,
+        iridescence_texture: IgnoredAny,
+        iridescence_ior: f64,
+        iridescence_thickness_maximum: f64,
+        iridescence_thickness_texture: IgnoredAny,
     }
     /// KHR_materials_transmission.
     Transmission {

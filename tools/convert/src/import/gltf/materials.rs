@@ -1,6 +1,6 @@
-//! Materials and their textures (glTF 2.0, sections 3.8 and 3.9, and the extensions KHR_materials_clearcoat,
-//! _emissive_strength, _ior, _pbrSpecularGlossiness, _specular, _transmission, _unlit, _volume and
-//! KHR_texture_transform).
+//! Materials and their textures (glTF 2.0, sections 3.8 and 3.9, and the extensions KHR_materials_anisotropy,
+//! _clearcoat, _emissive_strength, _ior, _iridescence, _pbrSpecularGlossiness, _sheen, _specular, _transmission, _unlit,
+//! _volume and KHR_texture_transform).
 //!
 //! Filters of samplers are not kept: textures are averaged over what a pixel covers, whatever the sampler asks for.
 
@@ -9,7 +9,7 @@ use super::file::{File, Problem, item};
 use super::names::label;
 use crate::import::warnings::Warnings;
 use bricks::{
-    MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_REFRACTS, MATERIAL_TEXTURES, MATERIAL_UNLIT,
+    Layers, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_REFRACTS, MATERIAL_TEXTURES, MATERIAL_UNLIT,
     Material, NORMAL, pack_absorption,
 };
 use bricks::{WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT};
@@ -39,8 +39,10 @@ pub(super) struct Texture {
 pub(super) struct Coordinates {
     /// Whether each set is used.
     pub sets: [bool; SETS as usize],
-    /// Set and rows of the normal texture.
+    /// Set and rows of the normal texture; without one, but with anisotropy, those of the first set as they are.
     pub normal: Option<(usize, [[f32; 4]; 2])>,
+    /// Whether its reflection has a direction along the surface.
+    pub is_anisotropic: bool,
 }
 
 impl Coordinates {
@@ -53,6 +55,12 @@ impl Coordinates {
             if place == NORMAL {
                 coordinates.normal = Some((set, rows(info).unwrap_or(SAME)));
             }
+        }
+        let anisotropy = material.more.extensions.anisotropy.as_ref();
+        coordinates.is_anisotropic =
+            anisotropy.and_then(|extension| extension.anisotropy_strength).is_some_and(|strength| strength > 0.0);
+        if coordinates.is_anisotropic {
+            coordinates.normal = coordinates.normal.or(Some((0, SAME)));
         }
         coordinates
     }
@@ -142,6 +150,8 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
                 None => warnings.add("texture transform out of range; ignored", place),
             }
         }
+        let layers = layers(json, &material, warnings, &place);
+        material.set_layers(&layers);
         materials.push(material);
     }
     (materials, textures)
@@ -237,6 +247,43 @@ fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &d
     if material.clearcoat > 0.0 && textures.into_iter().any(Option::is_some) {
         warnings.add("clear-coat textures ignored; factors used", place);
     }
+}
+
+/// KHR_materials_sheen, _anisotropy and _iridescence.
+fn layers(json: &Json, material: &Material, warnings: &mut Warnings, place: &dyn Fn() -> String) -> Layers {
+    let extensions = &json.more.extensions;
+    let mut layers = Layers::NONE;
+    if let Some(sheen) = &extensions.sheen {
+        layers.sheen = sheen.sheen_color_factor.unwrap_or([0.0; 3]).map(unit);
+        layers.sheen_roughness = unit(sheen.sheen_roughness_factor.unwrap_or(0.0));
+        if sheen.sheen_color_texture.is_some() || sheen.sheen_roughness_texture.is_some() {
+            warnings.add("sheen textures ignored; factors used", place);
+        }
+    }
+    if let Some(anisotropy) = &extensions.anisotropy {
+        layers.anisotropy = unit(anisotropy.anisotropy_strength.unwrap_or(0.0));
+        let turns = anisotropy.anisotropy_rotation.unwrap_or(0.0) / std::f64::consts::TAU;
+        layers.rotation = if turns.is_finite() { (turns - turns.floor()) as f32 } else { 0.0 };
+        if anisotropy.anisotropy_texture.is_some() {
+            warnings.add("anisotropy textures ignored; factors used", place);
+        }
+    }
+    if let Some(film) = extensions.iridescence.as_ref().filter(|film| film.iridescence_factor.is_some_and(|f| f > 0.0))
+    {
+        let passes = material.transmission > 0.0 && material.flags & MATERIAL_REFRACTS == 0;
+        if passes {
+            // Their specular reflection is that of the rays that do not pass, and no index of refraction.
+            warnings.add("iridescence ignored of thin walls that let light through", place);
+            return layers;
+        }
+        layers.film = unit(film.iridescence_factor.unwrap_or(0.0));
+        layers.film_index = film.iridescence_ior.unwrap_or(1.3).clamp(1.0, MOST_INDEX) as f32;
+        layers.film_thickness = film.iridescence_thickness_maximum.unwrap_or(400.0).clamp(0.0, 1e6) as f32;
+        if film.iridescence_texture.is_some() || film.iridescence_thickness_texture.is_some() {
+            warnings.add("iridescence textures ignored; factor and greatest thickness used", place);
+        }
+    }
+    layers
 }
 
 /// KHR_materials_transmission, of thin walls: rays pass straight through, whatever the roughness, and each is either

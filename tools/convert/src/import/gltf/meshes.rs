@@ -71,9 +71,14 @@ struct Geometry {
     tangents: Option<Accessor>,
     /// Set and rows of the normal texture's coordinates; `None`: no tangents are wanted.
     normal_coordinates: Option<(usize, [[f32; 4]; 2])>,
+    /// Tangents are wanted even where there are no coordinates.
+    is_anisotropic: bool,
     colors: Option<Accessor>,
     indices: Option<Accessor>,
 }
+
+/// The tangent of anisotropy without texture coordinates: what of the mesh's x axis lies along the surface.
+const ALONG_X: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
 
 const FLOAT_OR_QUANTIZED: &[Component] =
     &[Component::F32, Component::I8, Component::U8, Component::I16, Component::U16];
@@ -171,7 +176,7 @@ pub(super) fn check(
     let normals = attribute(Semantic::Normals, &NORMAL)?;
     let colors = attribute(Semantic::Colors(0), &COLOR)?;
     let looks = material.and_then(|m| file.document.materials[m].0.as_ref().ok());
-    let Coordinates { sets, normal } = looks.map(Coordinates::of).unwrap_or_default();
+    let Coordinates { sets, normal, is_anisotropic } = looks.map(Coordinates::of).unwrap_or_default();
     let uvs = attribute(Semantic::TexCoords(0), &TEXCOORD)?;
     let uvs1 = if sets[1] { attribute(Semantic::TexCoords(1), &TEXCOORD)? } else { None };
     let is_there = [uvs.is_some(), uvs1.is_some()];
@@ -180,7 +185,7 @@ pub(super) fn check(
     }
     let normal_coordinates = normal.filter(|(set, _)| is_there[*set]);
     // Tangents without normals mean nothing (glTF 2.0, section 3.7.2.1).
-    let has_frame = normal_coordinates.is_some() && normals.is_some();
+    let has_frame = (normal_coordinates.is_some() || is_anisotropic) && normals.is_some();
     let tangents = if has_frame { attribute(Semantic::Tangents, &TANGENT)? } else { None };
     let others = [("NORMAL", &normals), ("COLOR_0", &colors), ("TEXCOORD_0", &uvs), ("TEXCOORD_1", &uvs1)];
     for (name, other) in others.into_iter().chain([("TANGENT", &tangents)]) {
@@ -204,8 +209,19 @@ pub(super) fn check(
         warnings.add("incomplete last triangle skipped", place);
     }
     let triangles = topology.triangles(elements);
-    let geometry =
-        Geometry { topology, triangles, positions, normals, uvs, uvs1, tangents, normal_coordinates, colors, indices };
+    let geometry = Geometry {
+        topology,
+        triangles,
+        positions,
+        normals,
+        uvs,
+        uvs1,
+        tangents,
+        normal_coordinates,
+        is_anisotropic,
+        colors,
+        indices,
+    };
     Ok(Checked { material, geometry: Some(geometry) })
 }
 
@@ -307,8 +323,12 @@ impl Checked {
             colors.into_iter().map(color).collect()
         });
         let mut primitive = Primitive { material, positions, normals, uvs, uvs1, tangents, colors, indices };
-        if let (None, Some((set, rows))) = (&primitive.tangents, &geometry.normal_coordinates) {
-            primitive.tangents = tangents::make(&primitive, *set, rows);
+        if primitive.tangents.is_none() {
+            primitive.tangents = match &geometry.normal_coordinates {
+                Some((set, rows)) => tangents::make(&primitive, *set, rows),
+                None if geometry.is_anisotropic => Some(vec![ALONG_X; primitive.indices.len()]),
+                None => None,
+            };
         }
         Ok(Read { primitive, repairs })
     }

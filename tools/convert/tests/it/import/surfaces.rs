@@ -2,7 +2,8 @@
 
 use super::writer::*;
 use bricks::{
-    LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_BLEND, MATERIAL_REFRACTS, Material, NONE, unpack_absorption,
+    LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_ANISOTROPIC, MATERIAL_BLEND, MATERIAL_LAYERS, MATERIAL_REFRACTS,
+    Material, NONE, unpack_absorption,
 };
 use brickwalk_convert::import::Input;
 use brickwalk_convert::source::{Primitive, SourceScene};
@@ -222,6 +223,81 @@ fn bodies_refract_by_index_and_attenuation() {
     assert_eq!(of(json!({"thicknessFactor": 1}), json!({})).0.absorption, 0);
     let (_, warnings) = of(volume, json!({"KHR_materials_specular": {"specularFactor": 0.5}}));
     assert!(warnings.len() == 1 && warnings[0].contains("refracts"), "{warnings:?}");
+}
+
+#[test]
+fn sheen_anisotropy_and_films_are_kept() {
+    let all = json!({
+        "KHR_materials_sheen": {"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.25},
+        "KHR_materials_anisotropy": {"anisotropyStrength": 0.75, "anisotropyRotation": -std::f64::consts::FRAC_PI_2},
+        "KHR_materials_iridescence": {"iridescenceFactor": 0.5, "iridescenceIor": 1.5,
+            "iridescenceThicknessMinimum": 10, "iridescenceThicknessMaximum": 250}
+    });
+    let (found, warnings) = material(json!({"extensions": all}));
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(found.flags, MATERIAL_LAYERS | MATERIAL_ANISOTROPIC);
+    let layers = found.layers();
+    let close = |a: f32, b: f32| assert!((a - b).abs() < 2e-4, "{a} is not {b}: {layers:?}");
+    [(layers.sheen[0], 1.0), (layers.sheen[1], 0.5), (layers.sheen[2], 0.0), (layers.sheen_roughness, 0.25)]
+        .into_iter()
+        .chain([(layers.anisotropy, 0.75), (layers.rotation, 0.75), (layers.film, 0.5), (layers.film_index, 1.5)])
+        .for_each(|(a, b)| close(a, b));
+    assert_eq!(layers.film_thickness, 250.0);
+    // What they leave out by default.
+    let film = json!({"KHR_materials_iridescence": {"iridescenceFactor": 1}});
+    let (found, _) = material(json!({"extensions": film}));
+    assert_eq!((found.flags, found.layers().film_thickness), (MATERIAL_LAYERS, 400.0));
+    assert!((found.layers().film_index - 1.3).abs() < 1e-3);
+    for none in [
+        json!({"KHR_materials_sheen": {"sheenRoughnessFactor": 1}}),
+        json!({"KHR_materials_anisotropy": {"anisotropyRotation": 1}}),
+        json!({"KHR_materials_iridescence": {"iridescenceIor": 2}}),
+    ] {
+        assert_eq!(material(json!({"extensions": none})).0, material(json!({})).0);
+    }
+    // Their textures are left out, and films on thin walls, with a warning each.
+    for (name, texture) in [
+        ("sheen", json!({"sheenColorFactor": [1, 1, 1], "sheenColorTexture": {"index": 0}})),
+        ("anisotropy", json!({"anisotropyStrength": 1, "anisotropyTexture": {"index": 0}})),
+        ("iridescence", json!({"iridescenceFactor": 1, "iridescenceThicknessTexture": {"index": 0}})),
+    ] {
+        let mut extensions = json!({});
+        extensions[format!("KHR_materials_{name}")] = texture;
+        let (found, warnings) = material(json!({"extensions": extensions}));
+        assert!(warnings.len() == 1 && warnings[0].contains(name), "{warnings:?}");
+        assert_ne!(found.flags & MATERIAL_LAYERS, 0);
+    }
+    let glass = |volume: Value| {
+        let extensions = json!({"KHR_materials_iridescence": {"iridescenceFactor": 1}, "KHR_materials_volume": volume,
+            "KHR_materials_transmission": {"transmissionFactor": 1}});
+        material(json!({"pbrMetallicRoughness": {"metallicFactor": 0}, "extensions": extensions}))
+    };
+    let (wall, warnings) = glass(json!({}));
+    assert!(warnings.len() == 1 && warnings[0].contains("thin walls") && wall.flags & MATERIAL_LAYERS == 0);
+    let (body, warnings) = glass(json!({"thicknessFactor": 1}));
+    assert!(warnings.is_empty() && body.flags & MATERIAL_LAYERS != 0);
+}
+
+#[test]
+fn anisotropy_has_tangents() {
+    let brushed = |rotation: f64, more: Value| {
+        let mut material = json!({"extensions": {"KHR_materials_anisotropy":
+            {"anisotropyStrength": 0.5, "anisotropyRotation": rotation}}});
+        material.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        square(material)
+    };
+    // By the first coordinates, unless a normal texture has others.
+    assert_eq!(only(&brushed(1.0, json!({})).scene()).0.tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 6][..]));
+    let textured = brushed(1.0, json!({"normalTexture": {"index": 0, "texCoord": 1}})).scene();
+    assert_eq!(only(&textured).0.tangents.as_deref(), Some(&[[0.0, -1.0, 0.0, -1.0]; 6][..]));
+    // Without coordinates the file's; without either along x.
+    let mut file = brushed(1.0, json!({}));
+    let tangents = file.floats("VEC4", &[0.0, 1.0, 0.0, -1.0].repeat(4));
+    let attributes = file.root["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap();
+    attributes.remove("TEXCOORD_0");
+    assert_eq!(only(&file.scene()).0.tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 6][..]));
+    file.root["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = json!(tangents);
+    assert_eq!(only(&file.scene()).0.tangents.as_deref(), Some(&[[0.0, 1.0, 0.0, -1.0]; 6][..]));
 }
 
 #[test]
