@@ -25,8 +25,16 @@ fn main() {
     let is_kernel = |name: &&String| fs::read_to_string(shaders.join(name)).is_ok_and(|text| text.contains("@compute"));
     for name in files.iter().filter(is_kernel) {
         for pages in [
-            wgsl::Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false, hides: false },
-            wgsl::Pages { cache: 3, texels: 2, opacity: true, gloss: true, levels: true, hides: true },
+            wgsl::Pages {
+                cache: 1,
+                texels: 1,
+                opacity: false,
+                gloss: false,
+                layers: false,
+                levels: false,
+                hides: false,
+            },
+            wgsl::Pages { cache: 3, texels: 2, opacity: true, gloss: true, layers: true, levels: true, hides: true },
         ] {
             let text =
                 wgsl::assemble(name, pages, &read).unwrap_or_else(|| panic!("{name}: an included file is missing"));
@@ -52,7 +60,8 @@ fn layout(files: &[String], read: &dyn Fn(&str) -> Option<String>) -> String {
     let types = || files.iter().filter(|name| name.ends_with("types.wgsl"));
     let all = "*types.wgsl";
     let includes: String = types().map(|name| format!("#include \"{name}\"\n")).collect();
-    let pages = wgsl::Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false, hides: false };
+    let pages =
+        wgsl::Pages { cache: 1, texels: 1, opacity: false, gloss: false, layers: false, levels: false, hides: false };
     let with_all = |name: &str| if name == all { Some(includes.clone()) } else { read(name) };
     let text = wgsl::assemble(all, pages, &with_all).unwrap_or_else(|| panic!("{all}: an included file is missing"));
     let texts: Vec<(&str, String)> = types().filter_map(|name| Some((name.as_str(), read(name)?))).collect();

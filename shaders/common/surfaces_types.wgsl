@@ -22,7 +22,8 @@ struct Material {         // What surfaces are made of, as in the scene file.
     transmission: f32,    // share of light that thin walls or a body let through
     uv_sets: u32,         // bit i: texture i takes the second set of coordinates
     absorption: u32,      // of a body that refracts, per world unit: mantissas of 9 bits, an exponent of 5
-    uv_from_set: array<vec4<f32>, 10>, // two rows a texture; w of the first: by what areas grow
+    // two rows a texture; w of the first: by what areas grow; of the second: a word of the layers, a number of 24 bits
+    uv_from_set: array<vec4<f32>, 10>,
 }
 
 struct Texture {          // A texture that is cut into tiles.
@@ -75,6 +76,8 @@ struct GBuffer {          // what shading reads of a primary hit
 const MATERIAL_DOUBLE_SIDED: u32 = 4u; // both sides are drawn
 const MATERIAL_UNLIT: u32 = 8u;    // it shows its base colour, whatever the light
 const MATERIAL_REFRACTS: u32 = 16u; // the surface of a body that bends light, with PARAM_REFRACT; else thin walls
+const MATERIAL_LAYERS: u32 = 32u;  // it has sheen, anisotropy or a thin film
+const MATERIAL_ANISOTROPIC: u32 = 64u; // its reflection has a direction along the surface
 const GBUFFER_READ: u32 = 1u;      // attributes are read
 const GBUFFER_WAITS: u32 = 62u;    // bits of textures that have still to be looked up, the first is that of texture 0
 const GBUFFER_COARSER: u32 = 64u;  // a coarser level of a texture was looked up
@@ -89,6 +92,16 @@ const OCCLUSION: u32 = 3u;         // its occlusion texture
 const EMISSIVE: u32 = 4u;          // its emissive texture
 const MATERIAL_TEXTURES: u32 = 5u; // number of textures of a material
 const REFLECTANCE_SIZE: u32 = 32u; // rows and columns of the table of reflectances
+const SHEENS: u32 = 1024u;         // behind it: the table of sheen, of the same rows and columns
+const FACET_COSINES: u32 = 2048u;  // that of cosines between views and facets, two entries each
+const STRETCHED: u32 = 4096u;      // that of anisotropic facets
+const STRETCHED_COSINES: u32 = 16u; // its columns, by the root of the view's cosine
+const STRETCHED_ROUGHNESSES: u32 = 12u; // its rows, by the root of the alpha across the direction
+const STRETCHED_STRENGTHS: u32 = 8u; // its blocks of rows, by the strength
+const STRETCHED_AZIMUTHS: u32 = 5u; // how many such there are, by the cosine from the direction to the view
+const LAYER_STEPS: u32 = 4095u;    // steps of a share in a word of the layers; its low 12 bits
+const LAYER_BITS: u32 = 12u;       // where the other number begins
+const LAYER_INDEX_STEPS: u32 = 1024u; // of indices of refraction above 1
 const TEXTURE_RGBA8: u32 = 0u;     // encoding: texels
 const TEXTURE_BC7: u32 = 1u;       // encoding: blocks of colours
 const TEXTURE_BC5: u32 = 2u;       // encoding: blocks of x and y of directions

@@ -2,8 +2,9 @@
 // Smith's masking, Fresnel by Schlick, the light of further bounces between facets by Turquin (2019), and a clear coat
 // of the same kind on top. The diffuse part has what they leave of the light (the albedo scaling of
 // KHR_materials_specular), so that no energy is gained. Facets of bodies that refract let pass what they do not reflect
-// (Walter, Marschner, Li, Torrance 2007); the light of further bounces between them is lost. Twin:
-// src/kernels/shade/gloss.rs.
+// (Walter, Marschner, Li, Torrance 2007); the light of further bounces between them is lost. Sheen, anisotropy and thin
+// films are in shade/layers.wgsl. Twin: src/kernels/shade/gloss.rs.
+#include "shade/layers.wgsl"
 
 // Of a lobe's square root of roughness; smoother ones are as sharp as this.
 const LEAST_ALPHA: f32 = 0.001;
@@ -25,6 +26,7 @@ struct Gloss {
     coat_share: f32,      // of light from everywhere, reflected by the coat
     choice: f32,          // probability that a direction is drawn by the coat
     through: vec3<f32>,   // share of the light that facets do not reflect which enters the body, or leaves it
+    layers: Layers,
     eta: f32,             // index of refraction on the side of the view over that beyond; 0 where nothing refracts
 }
 
@@ -33,12 +35,17 @@ const LEAST_COS_VIEW: f32 = 1.0e-4;
 // What a lobe with reflectances of (1, 0) and of (0, 1) along the normal and at grazing angles reflects of light from
 // everywhere.
 fn reflectance(cosine: f32, alpha: f32) -> vec2<f32> {
+    return table_at(0u, cosine, alpha);
+}
+
+// Of one of the tables with the same rows and columns.
+fn table_at(first: u32, cosine: f32, alpha: f32) -> vec2<f32> {
     let most = f32(REFLECTANCE_SIZE - 1u);
     let x = clamp(sqrt(cosine), 0.0, 1.0) * most;
     let y = clamp(sqrt(alpha), 0.0, 1.0) * most;
     let column = min(u32(x), REFLECTANCE_SIZE - 2u);
     let row = min(u32(y), REFLECTANCE_SIZE - 2u);
-    let at = row * REFLECTANCE_SIZE + column;
+    let at = first + row * REFLECTANCE_SIZE + column;
     let right = x - f32(column);
     let low = mix(reflectances[at], reflectances[at + 1u], right);
     let high = mix(reflectances[at + REFLECTANCE_SIZE], reflectances[at + REFLECTANCE_SIZE + 1u], right);
@@ -50,14 +57,17 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
     let m = materials[g.material];
     var s: Gloss;
     s.diffuse = g.albedo;
-    if (m.flags & MATERIAL_UNLIT) != 0u || !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0) {
+    let has_layers = (m.flags & MATERIAL_LAYERS) != 0u;
+    let is_matt = !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0 || has_layers);
+    if (m.flags & MATERIAL_UNLIT) != 0u || is_matt {
         return s;
     }
     s.normal = g.normal;
     s.view = normalize(view);
     s.cos_view = max(dot(s.normal, s.view), LEAST_COS_VIEW);
     s.alpha = max(g.roughness * g.roughness, LEAST_ALPHA);
-    let around = reflectance(s.cos_view, s.alpha);
+    lay(&s, g, m);
+    let around = facets_around(s);
     let white = around.x + around.y;
     var bounces = (1.0 - white) / white;
     var specular = m.specular;
@@ -79,7 +89,8 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
     s.f0 = mix(specular * of_dielectric, g.albedo * of_metal, g.metallic);
     s.f90 = mix(m.specular_weight * of_dielectric, of_metal, g.metallic);
     s.share = s.f0 * around.x + s.f90 * around.y;
-    let left = vec3<f32>(1.0) - (specular * around.x + vec3<f32>(m.specular_weight * around.y)) * of_dielectric;
+    var left = vec3<f32>(1.0) - (specular * around.x + vec3<f32>(m.specular_weight * around.y)) * of_dielectric;
+    lay_film(&s, &left, specular, g, white, bounces);
     let below_facets = g.albedo * (1.0 - g.metallic);
     s.diffuse = below_facets * (1.0 - inside) * max(left, vec3<f32>(0.0));
     s.through = below_facets * inside;
@@ -93,8 +104,13 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
         s.diffuse *= s.under;
         s.through *= s.under;
     }
+    lay_sheen(&s);
     let below = s.under * max(s.share.x, max(s.share.y, s.share.z));
-    s.choice = s.coat_share / max(s.coat_share + below, 1.0e-20);
+    let sheen = sheen_around(s);
+    let of_sheen = max(sheen.x, max(sheen.y, sheen.z));
+    let all = max(s.coat_share + below + of_sheen, 1.0e-20);
+    s.choice = s.coat_share / all;
+    s.layers.choice = of_sheen / all;
     return s;
 }
 
@@ -104,7 +120,7 @@ fn is_glossy(s: Gloss) -> bool {
 
 // Square of the roughness of its widest lobe.
 fn greatest_alpha(s: Gloss) -> f32 {
-    return max(s.alpha, s.coat_alpha);
+    return max(max(s.alpha, s.coat_alpha), layers_alpha(s));
 }
 
 // A lobe toward d: x is distribution and masking over 4 times both cosines, y the density by which directions are
@@ -136,15 +152,16 @@ fn squared_beyond(s: Gloss, cosine: f32) -> f32 {
 
 // What a facet reflects, by the cosine on the side that is not within the body (Schlick).
 fn fresnel(s: Gloss, half_way: vec3<f32>) -> vec3<f32> {
-    if s.eta <= 1.0 {
-        return mix(s.f0, s.f90, grazing(half_way, s.view));
+    var cosine = dot(half_way, s.view);
+    if s.eta > 1.0 {
+        let squared = squared_beyond(s, cosine);
+        if squared <= 0.0 {
+            return vec3<f32>(1.0);
+        }
+        cosine = sqrt(squared);
     }
-    let squared = squared_beyond(s, dot(half_way, s.view));
-    if squared <= 0.0 {
-        return vec3<f32>(1.0);
-    }
-    let c = clamp(1.0 - sqrt(squared), 0.0, 1.0);
-    return mix(s.f0, s.f90, c * c * c * c * c);
+    let c = clamp(1.0 - cosine, 0.0, 1.0);
+    return with_film(s, cosine, mix(s.f0, s.f90, c * c * c * c * c));
 }
 
 // Probability that a direction by a facet is one of reflection.
@@ -163,7 +180,7 @@ fn reflected(s: Gloss, d: vec3<f32>) -> vec3<f32> {
         return vec3<f32>(0.0);
     }
     let half_way = normalize(s.view + d);
-    var sum = fresnel(s, half_way) * (s.under * lobe(s, s.alpha, d, half_way).x);
+    var sum = fresnel(s, half_way) * (s.under * facet_lobe(s, d, half_way).x) + sheen_toward(s, d, half_way);
     if s.coat > 0.0 {
         let f = grazing(half_way, s.view);
         sum += vec3<f32>(s.coat * mix(COAT_F0, 1.0, f) * lobe(s, s.coat_alpha, d, half_way).x);
@@ -177,7 +194,8 @@ fn density_of(s: Gloss, d: vec3<f32>) -> f32 {
         return 0.0;
     }
     let half_way = normalize(s.view + d);
-    var density = (1.0 - s.choice) * reflects_by(s, half_way) * lobe(s, s.alpha, d, half_way).y;
+    let of_facets = 1.0 - s.choice - s.layers.choice;
+    var density = of_facets * reflects_by(s, half_way) * facet_lobe(s, d, half_way).y + s.layers.choice / TURN;
     if s.coat > 0.0 {
         density += s.choice * lobe(s, s.coat_alpha, d, half_way).y;
     }
@@ -186,7 +204,7 @@ fn density_of(s: Gloss, d: vec3<f32>) -> f32 {
 
 // Share of light of one radiance from everywhere that the surface reflects otherwise than diffusely.
 fn reflected_around(s: Gloss) -> vec3<f32> {
-    return s.share * s.under + vec3<f32>(s.coat_share);
+    return s.share * s.under + vec3<f32>(s.coat_share) + sheen_around(s);
 }
 
 // What the surface reflects otherwise than diffusely of the background, unshadowed, where rays of its own do not bring
@@ -210,18 +228,25 @@ fn reflected_by_diffuse_rays(s: Gloss) -> vec3<f32> {
 // A direction drawn by the facets that are seen (Dupuy, Benyoub 2023, "Sampling visible GGX normals with spherical
 // caps"), a unit vector; it may lead below the surface. w: 1 where it leads through a facet, else it is reflected.
 fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec4<f32> {
-    let is_coat = unit(words.z) < s.choice;
-    let alpha = select(s.alpha, s.coat_alpha, is_coat);
-    let x = tangent(s.normal);
+    let number = unit(words.z);
+    let is_coat = number < s.choice;
+    if !is_coat && draws_sheen(s, number) {
+        return vec4<f32>(sheen_direction(s, words), 0.0);
+    }
+    var alphas = vec2<f32>(select(s.alpha, s.coat_alpha, is_coat));
+    var x = tangent(s.normal);
+    if !is_coat {
+        stretch(s, &x, &alphas);
+    }
     let y = cross(s.normal, x);
-    let v = normalize(vec3<f32>(alpha * dot(s.view, x), alpha * dot(s.view, y), s.cos_view));
+    let v = normalize(vec3<f32>(alphas.x * dot(s.view, x), alphas.y * dot(s.view, y), s.cos_view));
     let around = TURN * unit(words.x);
     let down = unit(words.y);
     // On the cap of heights -v.z to 1.
     let height = 1.0 - down * (1.0 + v.z);
     let level = sqrt(max((1.0 - height) * (1.0 + height), 0.0));
     let h = vec3<f32>(level * cos(around), level * sin(around), height) + v;
-    let facet = normalize(vec3<f32>(alpha * h.x, alpha * h.y, max(h.z, 0.0)));
+    let facet = normalize(vec3<f32>(alphas.x * h.x, alphas.y * h.y, max(h.z, 0.0)));
     let half_way = facet.x * x + facet.y * y + facet.z * s.normal;
     let cosine = dot(s.view, half_way);
     if s.eta > 0.0 && !is_coat && unit(pcg(words.z)) >= reflects_by(s, half_way) {
@@ -241,9 +266,9 @@ fn passed(s: Gloss, d: vec3<f32>) -> vec3<f32> {
     let reflects = fresnel(s, half_way);
     let left = max(1.0 - max(reflects.x, max(reflects.y, reflects.z)), 1.0e-6);
     let cosine = max(-dot(s.normal, d), 0.0);
-    let squared = s.alpha * s.alpha;
-    let unmasked = 2.0 * cosine / max(cosine + sqrt(squared + (1.0 - squared) * cosine * cosine), 1.0e-20);
-    return s.through * (vec3<f32>(1.0) - reflects) * (unmasked / (left * (1.0 - s.choice)));
+    let unmasked = 2.0 * cosine / max(cosine + facet_root(s, d, cosine), 1.0e-20);
+    let of_facets = 1.0 - s.choice - s.layers.choice;
+    return s.through * (vec3<f32>(1.0) - reflects) * (unmasked / (left * of_facets));
 }
 
 // Share of the light that facets do not reflect which goes through them.

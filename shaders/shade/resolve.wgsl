@@ -152,7 +152,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             g.state |= 1u << (GBUFFER_FIRST + place);
         }
     }
-    if g.state != GBUFFER_READ {
+    if g.state != GBUFFER_READ || (material.flags & MATERIAL_ANISOTROPIC) != 0u {
         g.footprint = footprint_of(seen_rays[index], hit.t, surface, uvs);
         if (b.flags & BRICK_DETAIL) != 0u {
             let w = place.world_from_object;

@@ -20,8 +20,8 @@ use crate::kernels::dispatch::{Dispatch, Workgroups, are_pairs_culled, dispatche
 use crate::kernels::layout::Params;
 use crate::kernels::table::{self, Bindings, Family, names};
 use crate::kernels::{
-    DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, layout, opacity, padded,
-    reflectance, report, textures,
+    DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, layer_tables, layout, opacity,
+    padded, reflectance, report, textures,
 };
 use crate::schedule::{BrickStates, Executor, ExecutorError, Load, Own, PairQuery, Pass, Report, Step};
 use crate::stream::{Item, Workers};
@@ -85,6 +85,7 @@ impl GpuExecutor {
             texels: texels.max(usize::from(keep.textures)),
             opacity: keep.opacity || (opacity::is_needed(resident) && !setup.opaque),
             gloss: keep.gloss || reflectance::is_needed(resident),
+            layers: layer_tables::is_needed(resident),
             levels: resident.has_levels_in_use(),
             hides: setup.hides,
         };
@@ -113,7 +114,7 @@ impl GpuExecutor {
             scene: SceneBuffers::new(&gpu, &scene, kernels.pages.levels)?,
             cache: CachePages::new(&gpu, page_sizes),
             texels: Texels::new(&gpu, &scene, setup.keep.textures)?,
-            lamps: LampBuffers::new(&gpu, kernels.pages.gloss),
+            lamps: LampBuffers::new(&gpu, kernels.pages),
             sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
             pixels: PixelBuffers::new(&gpu, extent.rays(), 0),
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),

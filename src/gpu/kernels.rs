@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn without_levels_nothing_of_them_is_in_kernels() {
         let has = |levels: bool| -> Vec<&str> {
-            let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels, hides: true };
+            let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, layers: true, levels, hides: true };
             let of_levels = |file: &str| {
                 let text = source(file, pages);
                 ["params.levels", "level_leaves", "pending >>", "workgroup> spreads"]
@@ -216,7 +216,8 @@ mod tests {
     #[test]
     fn as_many_pages_as_are_promised_can_be_bound() {
         let gpu = Gpu::open(None).unwrap();
-        let pages = |cache| Pages { cache, texels: 1, opacity: true, gloss: true, levels: true, hides: true };
+        let pages =
+            |cache| Pages { cache, texels: 1, opacity: true, gloss: true, layers: true, levels: true, hides: true };
         let cache = gpu.max_cache_pages(pages(0));
         assert!(cache > 1, "{cache} pages");
         Kernels::new(&gpu, pages(cache), false);

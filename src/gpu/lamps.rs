@@ -2,7 +2,9 @@
 
 use super::device::Gpu;
 use super::rays::storage;
+use super::wgsl::Pages;
 use crate::kernels::frame::Frame;
+use crate::kernels::layer_tables::LAYER_TABLES;
 use crate::kernels::reflectance::REFLECTANCES;
 use crate::kernels::{Lamps, layout};
 use crate::schedule::ExecutorError;
@@ -19,10 +21,14 @@ pub struct LampBuffers {
 }
 
 impl LampBuffers {
-    /// Of nothing. `gloss`: with the table of reflectances.
-    pub fn new(gpu: &Gpu, gloss: bool) -> Self {
+    /// Of nothing, with the tables that kernels for `pages` look up.
+    pub fn new(gpu: &Gpu, pages: Pages) -> Self {
         let [texels, table, emitters] = allocate(gpu, 0, 0);
-        let entries: &[[f32; 2]] = if gloss { &REFLECTANCES } else { &[] };
+        let entries: &[[f32; 2]] = match pages {
+            Pages { gloss: false, .. } => &[],
+            Pages { layers: false, .. } => &REFLECTANCES,
+            _ => &LAYER_TABLES,
+        };
         let reflectances = storage(gpu, "reflectances", entries.len(), 8);
         gpu.queue.write_buffer(&reflectances, 0, bytemuck::cast_slice(entries));
         Self { texels, table, emitters, reflectances, lamps: Arc::default(), frame: None }

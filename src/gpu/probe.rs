@@ -83,7 +83,7 @@ pub fn run(gpu: &Gpu) -> ProbeReport {
 pub fn source() -> String {
     kernels::source(
         "probe/probe",
-        Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false, hides: false },
+        Pages { cache: 1, texels: 1, opacity: false, gloss: false, layers: false, levels: false, hides: false },
     )
 }
 

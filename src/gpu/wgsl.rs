@@ -32,6 +32,8 @@ pub struct Pages {
     pub opacity: bool,
     /// Whether surfaces reflect otherwise than diffusely.
     pub gloss: bool,
+    /// Whether some of these surfaces have sheen, anisotropy or thin films.
+    pub layers: bool,
     /// Whether levels of detail stand for bricks.
     pub levels: bool,
     /// Whether triangles may be hidden.
@@ -74,6 +76,7 @@ fn append(
         "query/tile_spreads.wgsl" if !pages.levels => NO_SPREADS.into(),
         "shade/cones.wgsl" if !pages.levels => NO_CONES.into(),
         "shade/gloss.wgsl" if !pages.gloss => MATT.into(),
+        "shade/layers.wgsl" if !pages.layers => NO_LAYERS.into(),
         _ => file(name)?,
     };
     for line in text.lines() {
@@ -209,6 +212,46 @@ fn radiance_scale(s: Gloss) -> f32 {
 }
 fn left_within(g: GBuffer, way: f32) -> vec3<f32> {
     return vec3<f32>(1.0);
+}
+";
+
+/// What stands for `shade/layers.wgsl` where no material has sheen, anisotropy or a thin film.
+const NO_LAYERS: &str = "\
+struct Layers {
+    choice: f32,
+}
+fn lay(s: ptr<function, Gloss>, g: GBuffer, m: Material) {}
+fn facets_around(s: Gloss) -> vec2<f32> {
+    return reflectance(s.cos_view, s.alpha);
+}
+fn facet_root(s: Gloss, d: vec3<f32>, cosine: f32) -> f32 {
+    let squared = s.alpha * s.alpha;
+    return sqrt(squared + (1.0 - squared) * cosine * cosine);
+}
+fn facet_lobe(s: Gloss, d: vec3<f32>, half_way: vec3<f32>) -> vec2<f32> {
+    return lobe(s, s.alpha, d, half_way);
+}
+fn stretch(s: Gloss, x: ptr<function, vec3<f32>>, alphas: ptr<function, vec2<f32>>) {}
+fn lay_film(s: ptr<function, Gloss>, left: ptr<function, vec3<f32>>, specular: vec3<f32>, g: GBuffer, white: f32, \
+bounces: f32) {}
+fn with_film(s: Gloss, cosine: f32, f: vec3<f32>) -> vec3<f32> {
+    return f;
+}
+fn lay_sheen(s: ptr<function, Gloss>) {}
+fn sheen_around(s: Gloss) -> vec3<f32> {
+    return vec3<f32>(0.0);
+}
+fn sheen_toward(s: Gloss, d: vec3<f32>, half_way: vec3<f32>) -> vec3<f32> {
+    return vec3<f32>(0.0);
+}
+fn draws_sheen(s: Gloss, number: f32) -> bool {
+    return false;
+}
+fn sheen_direction(s: Gloss, words: vec4<u32>) -> vec3<f32> {
+    return s.normal;
+}
+fn layers_alpha(s: Gloss) -> f32 {
+    return 0.0;
 }
 ";
 

@@ -16,6 +16,7 @@ pub mod emitters;
 pub mod frame;
 mod frame_executor;
 pub mod lamps;
+pub mod layer_tables;
 pub mod layout;
 pub mod levels;
 pub mod noise;

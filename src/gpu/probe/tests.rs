@@ -28,7 +28,8 @@ fn a_sound_device_passes() {
 /// An executor over the probe's own scene, with as many pages as asked and one kernel's text changed.
 fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<GpuExecutor> {
     let gpu = device()?;
-    let pages = Pages { cache: pages, texels: 1, opacity: false, gloss: false, levels: false, hides: false };
+    let pages =
+        Pages { cache: pages, texels: 1, opacity: false, gloss: false, layers: false, levels: false, hides: false };
     let source = |kernel: &str| change(kernel, kernels::source(kernel, pages));
     let kernels = Arc::new(Kernels::from_sources(&gpu, pages, false, &source));
     let scene = Arc::new(scene().unwrap());

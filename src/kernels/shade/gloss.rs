@@ -1,12 +1,13 @@
 //! How surfaces reflect otherwise than diffusely: twin of `shaders/shade/gloss.wgsl`.
 
 use super::lamps::unit;
+use super::layers::{Below, Layers, table_at};
 use super::light::ambient;
 use super::random::tangent;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
-    GBUFFER_BACK, GBUFFER_REFRACTS, GBuffer, MATERIAL_REFRACTS, MATERIAL_UNLIT, PARAM_BOUNCE, PARAM_GLOSSY,
-    REFLECTANCE_SIZE,
+    GBUFFER_BACK, GBUFFER_REFRACTS, GBuffer, MATERIAL_LAYERS, MATERIAL_REFRACTS, MATERIAL_UNLIT, PARAM_BOUNCE,
+    PARAM_GLOSSY,
 };
 use crate::kernels::reflectance::REFLECTANCES;
 use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, most3, normalize};
@@ -51,6 +52,7 @@ pub struct Gloss {
     pub through: Vec3,
     /// Index of refraction on the side of the view over that beyond; 0 where nothing refracts.
     pub eta: f32,
+    layers: Option<Layers>,
 }
 
 /// A direction that was drawn, a unit vector.
@@ -62,24 +64,12 @@ pub struct Drawn {
     pub is_through: bool,
 }
 
-/// What a lobe with reflectances of (1, 0) and of (0, 1) along the normal and at grazing angles reflects of light from
-/// everywhere.
-fn reflectance(cosine: f32, alpha: f32) -> [f32; 2] {
-    let most = (REFLECTANCE_SIZE - 1) as f32;
-    let [x, y] = [cosine, alpha].map(|x| x.sqrt().clamp(0.0, 1.0) * most);
-    let [column, row] = [x, y].map(|x| (x as u32).min(REFLECTANCE_SIZE - 2));
-    let at = (row * REFLECTANCE_SIZE + column) as usize;
-    let (right, up) = (x - column as f32, y - row as f32);
-    let size = REFLECTANCE_SIZE as usize;
-    let between = |at: usize, k: usize| mix(REFLECTANCES[at][k], REFLECTANCES[at + 1][k], right);
-    [0, 1].map(|k| mix(between(at, k), between(at + size, k), up))
-}
-
 impl Gloss {
     /// Of a hit seen along -view, of any length.
     pub fn of(g: &GBuffer, m: &Material, view: Vec3) -> Self {
         let mut s = Self { diffuse: g.albedo, ..Self::default() };
-        let is_matt = !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0);
+        let has_layers = m.flags & MATERIAL_LAYERS != 0;
+        let is_matt = !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0 || has_layers);
         if m.flags & MATERIAL_UNLIT != 0 || is_matt {
             return s;
         }
@@ -87,7 +77,9 @@ impl Gloss {
         s.view = normalize(view);
         s.cos_view = most(dot(s.normal, s.view), LEAST_COS_VIEW);
         s.alpha = most(g.roughness * g.roughness, LEAST_ALPHA);
-        let [along, grazing] = reflectance(s.cos_view, s.alpha);
+        s.layers = Layers::of(g, m, &s.below());
+        let stretched = s.layers.and_then(|layers| layers.facets_around(&s.below()));
+        let [along, grazing] = stretched.unwrap_or_else(|| table_at(&REFLECTANCES, s.cos_view, s.alpha));
         let white = along + grazing;
         let (mut bounces, mut specular, mut inside) = ((1.0 - white) / white, m.specular, 0.0);
         if m.flags & MATERIAL_REFRACTS != 0 {
@@ -106,7 +98,11 @@ impl Gloss {
         s.f0 = each(|k| mix(specular[k] * of_dielectric[k], g.albedo[k] * of_metal[k], g.metallic));
         s.f90 = each(|k| mix(m.specular_weight * of_dielectric[k], of_metal[k], g.metallic));
         s.share = each(|k| s.f0[k] * along + s.f90[k] * grazing);
-        let left = each(|k| 1.0 - (specular[k] * along + m.specular_weight * grazing) * of_dielectric[k]);
+        let mut left = each(|k| 1.0 - (specular[k] * along + m.specular_weight * grazing) * of_dielectric[k]);
+        let below = s.below();
+        if let Some(layers) = &mut s.layers {
+            layers.lay_film(&below, (&mut s.share, &mut left), specular, g, [white, bounces]);
+        }
         let below_facets = g.albedo.map(|c| c * (1.0 - g.metallic));
         s.diffuse = each(|k| below_facets[k] * (1.0 - inside) * most(left[k], 0.0));
         s.through = below_facets.map(|c| c * inside);
@@ -114,20 +110,47 @@ impl Gloss {
         s.under = 1.0;
         if s.coat > 0.0 {
             s.coat_alpha = most(m.clearcoat_roughness * m.clearcoat_roughness, LEAST_ALPHA);
-            let of_coat = reflectance(s.cos_view, s.coat_alpha);
+            let of_coat = table_at(&REFLECTANCES, s.cos_view, s.coat_alpha);
             s.coat_share = s.coat * (COAT_F0 * of_coat[0] + of_coat[1]);
             s.under = 1.0 - s.coat_share;
             s.diffuse = s.diffuse.map(|c| c * s.under);
             s.through = s.through.map(|c| c * s.under);
         }
+        if let Some(layers) = &mut s.layers {
+            let left = layers.lay_sheen(&below, s.under);
+            s.under *= left;
+            s.diffuse = s.diffuse.map(|c| c * left);
+            s.through = s.through.map(|c| c * left);
+        }
         let below = s.under * most3(s.share);
-        s.choice = s.coat_share / most(s.coat_share + below, 1.0e-20);
+        let of_sheen = s.layers.map_or(0.0, |layers| most3(layers.sheen_around()));
+        let all = most(s.coat_share + below + of_sheen, 1.0e-20);
+        s.choice = s.coat_share / all;
+        if let Some(layers) = &mut s.layers {
+            layers.choice = of_sheen / all;
+        }
         s
+    }
+
+    /// What its layers lie on.
+    fn below(&self) -> Below {
+        Below { normal: self.normal, view: self.view, cos_view: self.cos_view, alpha: self.alpha }
     }
 
     /// Square of the roughness of its widest lobe.
     pub fn greatest_alpha(&self) -> f32 {
-        most(self.alpha, self.coat_alpha)
+        most(most(self.alpha, self.coat_alpha), self.layers.map_or(0.0, |layers| layers.greatest_alpha()))
+    }
+
+    /// Probability that a direction is drawn by the sheen.
+    fn sheen_choice(&self) -> f32 {
+        self.layers.map_or(0.0, |layers| layers.choice)
+    }
+
+    /// The lobe of the facets below the coat.
+    fn facet_lobe(&self, d: Vec3, half_way: Vec3) -> [f32; 2] {
+        let stretched = self.layers.as_ref().and_then(|layers| layers.facet_lobe(&self.below(), d, half_way));
+        stretched.unwrap_or_else(|| self.lobe(self.alpha, d, half_way))
     }
 
     /// Whether there is more than the diffuse part.
@@ -164,16 +187,18 @@ impl Gloss {
 
     /// What a facet reflects, by the cosine on the side that is not within the body (Schlick).
     fn fresnel(&self, half_way: Vec3) -> Vec3 {
-        let by = |f: f32| each(|k| mix(self.f0[k], self.f90[k], f));
-        if self.eta <= 1.0 {
-            return by(self.grazing(half_way));
+        let mut cosine = dot(half_way, self.view);
+        if self.eta > 1.0 {
+            let squared = self.squared_beyond(cosine);
+            if squared <= 0.0 {
+                return [1.0; 3];
+            }
+            cosine = squared.sqrt();
         }
-        let squared = self.squared_beyond(dot(half_way, self.view));
-        if squared <= 0.0 {
-            return [1.0; 3];
-        }
-        let c = (1.0 - squared.sqrt()).clamp(0.0, 1.0);
-        by(c * c * c * c * c)
+        let c = (1.0 - cosine).clamp(0.0, 1.0);
+        let f = c * c * c * c * c;
+        let bare = each(|k| mix(self.f0[k], self.f90[k], f));
+        self.layers.as_ref().map_or(bare, |layers| layers.with_film(cosine, bare))
     }
 
     /// Probability that a direction by a facet is one of reflection.
@@ -192,8 +217,12 @@ impl Gloss {
             return [0.0; 3];
         }
         let half_way = self.half_way(d);
-        let lobe = self.under * self.lobe(self.alpha, d, half_way)[0];
+        let lobe = self.under * self.facet_lobe(d, half_way)[0];
         let mut sum = self.fresnel(half_way).map(|f| f * lobe);
+        if let Some(layers) = &self.layers {
+            let sheen = layers.sheen_toward(&self.below(), d, half_way);
+            sum = each(|k| sum[k] + sheen[k]);
+        }
         if self.coat > 0.0 {
             let f = self.grazing(half_way);
             let of_coat = self.coat * mix(COAT_F0, 1.0, f) * self.lobe(self.coat_alpha, d, half_way)[0];
@@ -208,7 +237,9 @@ impl Gloss {
             return 0.0;
         }
         let half_way = self.half_way(d);
-        let mut density = (1.0 - self.choice) * self.reflects_by(half_way) * self.lobe(self.alpha, d, half_way)[1];
+        let of_facets = 1.0 - self.choice - self.sheen_choice();
+        let by_facets = of_facets * self.reflects_by(half_way) * self.facet_lobe(d, half_way)[1];
+        let mut density = by_facets + self.sheen_choice() / TAU;
         if self.coat > 0.0 {
             density += self.choice * self.lobe(self.coat_alpha, d, half_way)[1];
         }
@@ -217,7 +248,9 @@ impl Gloss {
 
     /// Share of light of one radiance from everywhere that the surface reflects otherwise than diffusely.
     pub(super) fn around(&self) -> Vec3 {
-        self.share.map(|c| c * self.under + self.coat_share)
+        let around = self.share.map(|c| c * self.under + self.coat_share);
+        let sheen = self.layers.map_or([0.0; 3], |layers| layers.sheen_around());
+        each(|k| around[k] + sheen[k])
     }
 
     /// Share of light of one radiance from everywhere that the surface reflects, or lets through.
@@ -251,18 +284,24 @@ impl Gloss {
     /// A direction drawn by the facets that are seen (Dupuy, Benyoub 2023, "Sampling visible GGX normals with spherical
     /// caps").
     pub fn direction(&self, words: [u32; 4]) -> Drawn {
-        let is_coat = unit(words[2]) < self.choice;
+        let number = unit(words[2]);
+        let is_coat = number < self.choice;
+        let layers = self.layers.as_ref().filter(|_| !is_coat);
+        if let Some(layers) = layers.filter(|layers| number < self.choice + layers.choice) {
+            return Drawn { direction: layers.sheen_direction(self.normal, words), is_through: false };
+        }
         let alpha = if is_coat { self.coat_alpha } else { self.alpha };
-        let x = tangent(self.normal);
+        let stretched = layers.and_then(|layers| layers.stretched(&self.below()));
+        let (x, alphas) = stretched.unwrap_or_else(|| (tangent(self.normal), [alpha; 2]));
         let y = cross(self.normal, x);
-        let v = normalize([alpha * dot(self.view, x), alpha * dot(self.view, y), self.cos_view]);
+        let v = normalize([alphas[0] * dot(self.view, x), alphas[1] * dot(self.view, y), self.cos_view]);
         let around = TAU * unit(words[0]);
         let down = unit(words[1]);
         // On the cap of heights -v.z to 1.
         let height = 1.0 - down * (1.0 + v[2]);
         let level = most((1.0 - height) * (1.0 + height), 0.0).sqrt();
         let h = [level * around.cos() + v[0], level * around.sin() + v[1], height + v[2]];
-        let facet = normalize([alpha * h[0], alpha * h[1], most(h[2], 0.0)]);
+        let facet = normalize([alphas[0] * h[0], alphas[1] * h[1], most(h[2], 0.0)]);
         let half_way = each(|k| facet[0] * x[k] + facet[1] * y[k] + facet[2] * self.normal[k]);
         let cosine = dot(self.view, half_way);
         if self.eta > 0.0 && !is_coat && unit(pcg(words[2])) >= self.reflects_by(half_way) {
@@ -286,9 +325,11 @@ impl Gloss {
         let left = most(1.0 - most3(reflects), 1.0e-6);
         let cosine = most(-dot(self.normal, d), 0.0);
         let squared = self.alpha * self.alpha;
-        let root = (squared + (1.0 - squared) * cosine * cosine).sqrt();
+        let stretched = self.layers.as_ref().and_then(|layers| layers.facet_root(&self.below(), d, cosine));
+        let root = stretched.unwrap_or_else(|| (squared + (1.0 - squared) * cosine * cosine).sqrt());
         let unmasked = 2.0 * cosine / most(cosine + root, 1.0e-20);
-        each(|k| self.through[k] * (1.0 - reflects[k]) * (unmasked / (left * (1.0 - self.choice))))
+        let of_facets = 1.0 - self.choice - self.sheen_choice();
+        each(|k| self.through[k] * (1.0 - reflects[k]) * (unmasked / (left * of_facets)))
     }
 }
 

@@ -3,10 +3,14 @@
 pub mod choose;
 pub mod clip_rays;
 pub mod cones;
+mod film;
 pub mod generate;
 pub mod gloss;
 pub mod halve_rays;
 pub mod lamps;
+mod layers;
+#[cfg(test)]
+mod layers_tests;
 pub mod light;
 pub mod paths;
 pub mod random;

@@ -4,7 +4,7 @@
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     GBUFFER_BACK, GBUFFER_FIRST, GBUFFER_READ, GBUFFER_REFRACTS, GBuffer, INSTANCE_MIRRORED, INSTANCE_STRETCHED,
-    MATERIAL_REFRACTS, NO_NORMAL, NONE, PARAM_REFRACT, Params, Ray, STATE_ATTRIBUTES, Surface,
+    MATERIAL_ANISOTROPIC, MATERIAL_REFRACTS, NO_NORMAL, NONE, PARAM_REFRACT, Params, Ray, STATE_ATTRIBUTES, Surface,
 };
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
@@ -131,7 +131,7 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
             g.state |= 1 << (GBUFFER_FIRST + place);
         }
     }
-    if g.state != GBUFFER_READ {
+    if g.state != GBUFFER_READ || material.flags & MATERIAL_ANISOTROPIC != 0 {
         let footprint = |uvs| footprint_of(bound.params, &seen.rays[index], hit.t, surface, uvs);
         g.footprint = footprint(corners.map(|v| v.uv));
         if let Some(details) = attributes.details(surface.triangle) {

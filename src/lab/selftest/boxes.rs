@@ -204,7 +204,7 @@ fn entered(lab: &Lab, cases: &[BoxCase]) -> Result<Vec<(u32, [f32; 8])>> {
     };
     let text = kernels::source(
         "probe/probe_boxes",
-        Pages { cache: 1, texels: 1, opacity: false, gloss: false, levels: false, hides: false },
+        Pages { cache: 1, texels: 1, opacity: false, gloss: false, layers: false, levels: false, hides: false },
     );
     let text = lab.defect.map_or(text.clone(), |defect| defect.plant(text));
     let words = probe::dispatch(gpu, &probe::module(gpu, &text), "boxes", cases, BoxCase::words, 9)?;

@@ -184,6 +184,7 @@ impl Lab {
                     texels: 1,
                     opacity: false,
                     gloss: false,
+                    layers: false,
                     levels: false,
                     hides: false,
                 };

@@ -18,6 +18,7 @@ use crate::gpu::probe;
 use crate::gpu::wgsl::Pages;
 use crate::kernels::frame::Frame;
 use crate::kernels::lamps::{Emitter, Lamps, Shape};
+use crate::kernels::layer_tables;
 use crate::kernels::layout::{MET, NONE, Params, Ray};
 use crate::kernels::table::KERNELS;
 use crate::kernels::{Directions, Extent, FrameExecutor, Keep, Lod, Setup, View};
@@ -57,12 +58,19 @@ struct Device {
     kernels: Arc<Kernels>,
     /// Those that hide triangles, once they are asked for. A device need not bind what these and a method bind.
     hiding: OnceLock<Arc<Kernels>>,
+    /// Those of scenes without sheen, anisotropy and films.
+    plain: OnceLock<Arc<Kernels>>,
 }
 
 impl Device {
-    fn kernels(&self, hides: bool) -> Arc<Kernels> {
-        let make = || Arc::new(Kernels::new(&self.gpu, Pages { hides: true, ..self.kernels.pages }, true));
-        if hides { self.hiding.get_or_init(make).clone() } else { self.kernels.clone() }
+    fn kernels(&self, hides: bool, layers: bool) -> Arc<Kernels> {
+        let make = |pages| move || Arc::new(Kernels::new(&self.gpu, pages, true));
+        let pages = self.kernels.pages;
+        match (hides, layers) {
+            (true, _) => self.hiding.get_or_init(make(Pages { hides: true, ..pages })).clone(),
+            (false, true) => self.kernels.clone(),
+            (false, false) => self.plain.get_or_init(make(Pages { layers: false, ..pages })).clone(),
+        }
     }
 }
 
@@ -72,9 +80,9 @@ fn device() -> Option<Device> {
         crate::skip::skip("no adapter");
         return None;
     };
-    let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, levels: true, hides: false };
+    let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, layers: true, levels: true, hides: false };
     let kernels = Arc::new(Kernels::new(&gpu, pages, true));
-    Some(Device { gpu, kernels, hiding: OnceLock::new() })
+    Some(Device { gpu, kernels, hiding: OnceLock::new(), plain: OnceLock::new() })
 }
 
 /// One way to render.
@@ -203,7 +211,7 @@ fn lockstep(
     let host = || HostCache::new(1 << 20);
     let on_gpu = GpuExecutor::with_kernels(
         device.gpu.clone(),
-        device.kernels(hides > 0),
+        device.kernels(hides > 0, layer_tables::is_needed(scene.resident())),
         scene.clone(),
         Workers::new(scene.clone(), host(), 1).unwrap(),
         pages,

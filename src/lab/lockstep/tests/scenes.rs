@@ -55,7 +55,7 @@ pub fn textured(tiled: bool) -> Arc<SceneFile> {
             .map(|k: u32| (k * 37 + k / 7 * 11) as u8)
             .collect(),
     };
-    let material = |i: u32| bricks::Material {
+    let bare = |i: u32| bricks::Material {
         base_color: [0.9, 0.8, 0.7, 1.0 - 0.1 * i as f32],
         emission: [0.25 * i as f32; 3],
         alpha_cutoff: 0.25,
@@ -87,6 +87,20 @@ pub fn textured(tiled: bool) -> Arc<SceneFile> {
             rows
         },
         ..bricks::Material::DIFFUSE
+    };
+    // A film on brushed metal, all of them under a coat, and a film on a body that refracts.
+    let material = |i: u32| {
+        let mut material = bare(i);
+        material.set_layers(&bricks::Layers {
+            sheen: if i == 2 { [0.8, 0.5, 0.3] } else { [0.0; 3] },
+            sheen_roughness: 0.6,
+            anisotropy: [0.0, 0.8, 0.5, 0.6][i as usize],
+            rotation: 0.15 * i as f32,
+            film: [0.0, 0.9, 0.5, 0.7][i as usize],
+            film_index: 1.3 + 0.1 * i as f32,
+            film_thickness: 200.0 * i as f32,
+        });
+        material
     };
     let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
     let place = |mesh, world_from_mesh| Placement {
