@@ -6,16 +6,18 @@
 
 The materials are a plugin of Mitsuba's, written here from appendix B of the specification of glTF 2.0 and from
 docs/methods/light.md: GGX with Smith's correlated masking, Fresnel by Schlick, the light of further bounces between
-facets (Turquin 2019), what the diffuse part has left, a clear coat, and facets that refract. What facets reflect of
-light from everywhere is integrated here, by quadrature. Scenes are generated: spheres over roughness of metal, of
+facets (Turquin 2019), what the diffuse part has left, a clear coat, and facets that refract. Sheen, anisotropy and
+iridescence are written from KHR_materials_sheen, _anisotropy and _iridescence. What facets and sheen reflect of light
+from everywhere is integrated here, by quadrature. Scenes are generated: spheres over roughness of metal, of
 plastic and of coated things, glass, rough glass, glass beside metal, a box with a lamp, a room that is lit through a
-door, and a chain of small spheres. `mtl` is written as an OBJ file with a library of materials, and `teapots` is the
-file of that name, its 1,899 instances made one mesh for Mitsuba. Each is rendered with so many bounces as --bounces
-has.
+door, a chain of small spheres, velvet, brushed metal, and films on plastic and metal. `mtl` is written as an OBJ file
+with a library of materials, and `teapots` is the file of that name, its 1,899 instances made one mesh for Mitsuba. Each
+is rendered with so many bounces as --bounces has.
 
 A row of the table is a picture, as in tools/mitsuba.py. The exit status is 1 where means differ by more than half a
 percent and by more than three standard errors, and with --control where they do not: `roughness` and `index` tell
-Mitsuba a wrong roughness, and a wrong index of refraction.
+Mitsuba a wrong roughness, and a wrong index of refraction; `sheen` a wrong roughness of sheen, `anisotropy` a wrong
+strength, `film` a wrong thickness.
 
 The variant llvm_ad_rgb needs a libLLVM.so, which the system finds or DRJIT_LIBLLVM_PATH names: 19.1 works.
 """
@@ -52,7 +54,13 @@ SIZE = (160, 120)
 BOUND, ERRORS = 0.005, 3.0
 BATCHES = 8
 # Which scenes each wrong material shows in.
-CONTROLS = {"roughness": ("metals", "plastics", "coated"), "index": ("glass", "rough-glass")}
+CONTROLS = {
+    "roughness": ("metals", "plastics", "coated"),
+    "index": ("glass", "rough-glass"),
+    "sheen": ("sheen",),
+    "anisotropy": ("anisotropy",),
+    "film": ("iridescence",),
+}
 COSINES = 64
 
 
@@ -89,6 +97,93 @@ def white_lobe(alpha):
     return np.array(table)
 
 
+AZIMUTHS = 33
+
+
+def facets(view, alphas, angles=192, heights=256):
+    """Of facets that are seen: weights, which have a mean of what white ones reflect, and cosines to the view."""
+    a, b = np.meshgrid((np.arange(angles) + 0.5) / angles, (np.arange(heights) + 0.5) / heights, indexing="ij")
+    scale = np.array([*alphas, 1.0])
+
+    def root(d):
+        return np.sqrt(((d * scale) ** 2).sum(-1))
+
+    stretched = view * scale / root(view)
+    height = 1 - b * (1 + stretched[2])
+    level = np.sqrt(np.maximum(1 - height * height, 0))
+    h = np.stack([level * np.cos(2 * np.pi * a), level * np.sin(2 * np.pi * a), height], -1) + stretched
+    h = h * scale
+    h[..., 2] = np.maximum(h[..., 2], 0)
+    h /= np.linalg.norm(h, axis=-1, keepdims=True)
+    cosine = h @ view
+    light = 2 * cosine[..., None] * h - view
+    c, z = light[..., 2], view[2]
+    masked = c * (z + root(view)) / np.maximum(c * root(view) + z * root(light), 1e-12)
+    return np.where((c > 0) & (cosine > 0), masked, 0), np.clip(cosine, 0, 1)
+
+
+def film(lib, index, thickness, f0, cosine):
+    """Iridescent Fresnel of a film in air over a base that reflects f0 along the normal, a colour; at most all."""
+    fresnel0 = lambda beyond, before: ((beyond - before) / (beyond + before)) ** 2
+    schlick = lambda f, c: f + (1 - f) * (1 - c) ** 5
+    inner = lib.sqrt(1 - (1 - cosine * cosine) / index**2)
+    r12 = schlick(fresnel0(index, 1.0), cosine)
+    t121 = 1 - r12
+    path = 2 * index * thickness * inner
+
+    def wave(path, shift):
+        """X, Y and Z of cosines that are shifted by half turns."""
+        phase = 2 * math.pi * path * 1e-9
+        gauss = lambda value, place, variance, s: (
+            value * math.sqrt(2 * math.pi * variance) / 1.0685e-7
+        ) * lib.cos(place * phase + math.pi * s) * lib.exp(-variance * phase * phase)
+        x = gauss(5.4856e-13, 1.6810e6, 4.3278e9, shift[0]) + gauss(9.7470e-14, 2.2399e6, 4.5282e9, shift[0])
+        return x, gauss(4.4201e-13, 1.7953e6, 9.3046e9, shift[1]), gauss(5.2481e-13, 2.2084e6, 6.6121e9, shift[2])
+
+    base = [(1 + math.sqrt(min(f + 1e-4, 0.9999))) / (1 - math.sqrt(min(f + 1e-4, 0.9999))) for f in f0]
+    halves = [1 + (n < index) for n in base]
+    waves = [wave(m * path, [m * half for half in halves]) for m in (1, 2)]
+    rgb = ((3.2404542, -1.5371385, -0.4985314), (-0.9692660, 1.8760108, 0.0415560), (0.0556434, -0.2040259, 1.0572252))
+    colors = []
+    for n, row in zip(base, rgb):
+        r23 = schlick(fresnel0(n, index), inner)
+        r123 = lib.minimum(lib.maximum(r12 * r23, 1e-5), 0.9999)
+        all_orders = t121 * t121 * r23 / (1 - r123)
+        found, amplitude = r12 + all_orders, all_orders - t121
+        for xyz in waves:
+            amplitude = amplitude * lib.sqrt(r123)
+            found = found + amplitude * 2 * sum(m * x for m, x in zip(row, xyz))
+        colors.append(lib.minimum(lib.maximum(found, 0), 1))
+    return colors
+
+
+def sheen_masking(lib, cosine, alpha):
+    """Lambda of the fit for Charlie sheen."""
+    by = (1 - alpha) ** 2
+    a, b, c, d, e = (
+        rough * (1 - by) + smooth * by
+        for rough, smooth in (
+            (21.5473, 25.3245), (3.82987, 3.32435), (0.19823, 0.16801), (-1.97760, -1.27393), (-4.32054, -4.85967)
+        )
+    )
+    l = lambda x: a / (1 + b * x**c) + d * x + e
+    flat, steep = lib.maximum(cosine, 1e-6), lib.maximum(1 - cosine, 1e-6)
+    choose = np.where if lib is np else lib.select
+    return choose(cosine < 0.5, lib.exp(l(flat)), lib.exp(2 * l(0.5) - l(steep)))
+
+
+def white_sheen(cosine, alpha):
+    """What white sheen reflects of light from everywhere."""
+    angle = 0.5 * np.pi * (np.arange(1500)[:, None] + 0.5) / 1500
+    phi = np.pi * (np.arange(180)[None] + 0.5) / 180
+    sine, c = np.sin(angle), np.cos(angle)
+    h = np.stack([sine * np.cos(phi) + math.sqrt(1 - cosine**2), sine * np.sin(phi), c + cosine + 0 * phi])
+    squared = (h[0] ** 2 + h[1] ** 2) / (h**2).sum(0)
+    distribution = (2 + 1 / alpha) * squared ** (0.5 / alpha) / (2 * np.pi)
+    masking = 1 + sheen_masking(np, np.array(cosine), alpha) + sheen_masking(np, c, alpha)
+    return float((distribution / (masking * 4 * cosine) * sine).mean() * 0.5 * np.pi * 2 * np.pi)
+
+
 class Gltf(mi.BSDF):
     """How a material of glTF reflects and refracts."""
 
@@ -105,8 +200,16 @@ class Gltf(mi.BSDF):
         self.f0 = ((self.index - 1) / (self.index + 1)) ** 2
         self.coat = get("coat", 0.0)
         self.coat_alpha = max(get("coat_roughness", 0.0) ** 2, 0.001)
-        tables = np.concatenate([white_lobe(self.alpha), white_lobe(self.coat_alpha)], axis=1)
-        self.table = mi.Texture1f(mi.TensorXf(tables.astype(np.float32)))
+        self.strength, self.rotation = get("anisotropy", 0.0), get("rotation", 0.0)
+        self.along = self.alpha + (1 - self.alpha) * self.strength**2
+        self.sheen = mi.Color3f(*(get(f"sheen_{c}", 0.0) for c in "rgb"))
+        self.has_sheen = any(get(f"sheen_{c}", 0.0) for c in "rgb")
+        self.sheen_alpha = max(get("sheen_roughness", 0.0) ** 2, 0.01)
+        self.film, self.film_of = get("film", 0.0), (get("film_index", 1.3), get("film_thickness", 400.0))
+        self.film_bases = [[self.f0] * 3, [get(f"base_{c}", 1.0) for c in "rgb"]]
+        tables = np.concatenate([white_lobe(self.alpha), white_lobe(self.coat_alpha)], axis=1)[None]
+        tables = np.concatenate([np.repeat(tables, AZIMUTHS, 0), self.layers()], axis=2)
+        self.table = mi.Texture2f(mi.TensorXf(tables.astype(np.float32)))
         both = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide if self.transmission else mi.BSDFFlags.FrontSide
         self.m_components = [mi.BSDFFlags.GlossyReflection | both, mi.BSDFFlags.DiffuseReflection | both]
         if self.transmission:
@@ -115,33 +218,70 @@ class Gltf(mi.BSDF):
         for flags in self.m_components:
             self.m_flags = self.m_flags | flags
 
-    def parts(self, cosine):
+    def layers(self):
+        """By azimuth and cosine of the view: white facets' two numbers, two films' means of colours, and white sheen's."""
+        table = np.zeros((AZIMUTHS, COSINES, 9))
+        for i in range(COSINES if self.strength or self.film or self.has_sheen else 0):
+            c = max((i / (COSINES - 1)) ** 2, 1e-4)
+            sine = math.sqrt(1 - c * c)
+            if self.has_sheen:
+                table[:, i, 8] = white_sheen(c, self.sheen_alpha)
+            for k in range(AZIMUTHS if self.strength else 1):
+                x = k / (AZIMUTHS - 1)
+                view = np.array([sine * x, sine * math.sqrt(1 - x * x), c])
+                weights, cosines = facets(view, (self.along, self.alpha), *((64, 96) if self.strength else (192, 256)))
+                f = (1 - cosines) ** 5
+                found = [(weights * (1 - f)).mean(), (weights * f).mean()]
+                for base in self.film_bases:
+                    colors = film(np, *self.film_of, base, cosines) if self.film else [0 * f] * 3
+                    found += [(weights * color).mean() / weights.mean() for color in colors]
+                rows = slice(k, k + 1) if self.strength else slice(None)
+                table[rows, i, :8] = found
+        return table
+
+    def parts(self, wi):
         """Reflectances along the normal and at grazing angles, what is diffuse, the coat's share, and the choices."""
-        place = dr.sqrt(dr.clip(cosine, 0, 1))
+        place = dr.sqrt(dr.clip(wi.z, 0, 1))
+        azimuth = dr.clip(dr.abs(wi.x) / dr.maximum(dr.sqrt(wi.x * wi.x + wi.y * wi.y), 1e-6), 0, 1)
         # Texels have their centres at halves.
-        along, grazing, coat_along, coat_grazing = self.table.eval(
-            mi.Point1f((place * (COSINES - 1) + 0.5) / COSINES)
-        )
+        at = mi.Point2f((place * (COSINES - 1) + 0.5) / COSINES, (azimuth * (AZIMUTHS - 1) + 0.5) / AZIMUTHS)
+        along, grazing, coat_along, coat_grazing, *own, sheen_share = self.table.eval(at)
+        if self.strength:
+            along, grazing = own[:2]
         white = along + grazing
         more = dr.select(self.transmission > 0, 0.0, (1 - white) / white)
         dielectric, metal = 1 + self.f0 * more, 1 + self.base * more
         f0 = dr.lerp(mi.Color3f(self.f0 * dielectric), self.base * metal, self.metallic)
         f90 = dr.lerp(mi.Color3f(dielectric), metal, self.metallic)
         left = dr.maximum(1 - (self.f0 * along + grazing) * dielectric, 0)
+        share = f0 * along + f90 * grazing
+        self.films = []
+        if self.film:
+            means = [mi.Color3f(*own[2:5]), mi.Color3f(*own[5:8])]
+            self.films = [1 + mean * more for mean in means]
+            of_films = [white * mean * brighter for mean, brighter in zip(means, self.films)]
+            share = dr.lerp(share, dr.lerp(*of_films, self.metallic), self.film)
+            left = dr.lerp(mi.Color3f(left), mi.Color3f(1 - dr.max(of_films[0])), self.film)
         coat_share = self.coat * (0.04 * coat_along + coat_grazing)
-        under = 1 - coat_share
+        gain = dr.maximum(sheen_share, 1)
+        sheen = self.sheen * (1 - coat_share) / gain
+        self.sheen_scale = sheen
+        under = (1 - coat_share) * (1 - dr.max(self.sheen) * sheen_share / gain)
         below = self.base * (1 - self.metallic) * under
         diffuse, through = below * left * (1 - self.transmission), below * self.transmission
-        gloss = dr.max(f0 * along + f90 * grazing) * under + dr.max(through)
-        total = gloss + coat_share + dr.max(diffuse)
-        return f0, f90, diffuse, through, under, gloss / total, coat_share / total
+        gloss, of_sheen = dr.max(share) * under + dr.max(through), dr.max(sheen) * sheen_share
+        total = gloss + coat_share + of_sheen + dr.max(diffuse)
+        return f0, f90, diffuse, through, under, gloss / total, coat_share / total, of_sheen / total
 
-    def lobe(self, alpha, wi, wo, h):
+    def root(self, along, across, d):
+        return dr.sqrt(dr.square(along * d.x) + dr.square(across * d.y) + dr.square(d.z))
+
+    def lobe(self, along, across, wi, wo, h):
         """Distribution and masking over four cosines, and the density of directions by facets that are seen."""
-        squared = alpha * alpha
-        q = squared * h.z * h.z + h.x * h.x + h.y * h.y
+        squared = along * across
+        q = squared * h.z * h.z + across / along * h.x * h.x + along / across * h.y * h.y
         distribution = squared / (dr.pi * q * q)
-        ri, ro = (dr.sqrt(squared + (1 - squared) * x * x) for x in (wi.z, wo.z))
+        ri, ro = (self.root(along, across, x) for x in (wi, wo))
         masked = 0.5 / dr.maximum(wo.z * ri + wi.z * ro, 1e-20)
         return distribution * masked, 0.5 * distribution / (wi.z + ri)
 
@@ -150,25 +290,38 @@ class Gltf(mi.BSDF):
         beyond = 1 - eta * eta * (1 - cosine * cosine)
         outside = dr.select(eta > 1, dr.sqrt(dr.maximum(beyond, 0)), cosine)
         f = dr.power(dr.clip(1 - outside, 0, 1), 5)
-        return dr.select((eta > 1) & (beyond <= 0), mi.Color3f(1.0), dr.lerp(f0, f90, f))
+        found = dr.lerp(f0, f90, f)
+        if self.film:
+            dielectric, metal = (
+                mi.Color3f(*film(dr, *self.film_of, base, dr.clip(outside, 0, 1))) * brighter
+                for base, brighter in zip(self.film_bases, self.films)
+            )
+            found = dr.lerp(found, dr.lerp(dielectric, metal, self.metallic), self.film)
+        return dr.select((eta > 1) & (beyond <= 0), mi.Color3f(1.0), found)
 
     def eta(self, inside):
         return dr.select(inside, self.index, 1 / self.index) if self.transmission else mi.Float(0.5)
 
     def evaluated(self, wi, wo, inside):
         """Of reflection: the value times the cosine, and the density; both directions above."""
-        f0, f90, diffuse, _, under, gloss, coat = self.parts(wi.z)
+        f0, f90, diffuse, _, under, gloss, coat, of_sheen = self.parts(wi)
         h = dr.normalize(wi + wo)
-        value, density = self.lobe(self.alpha, wi, wo, h)
+        value, density = self.lobe(self.along, self.alpha, wi, wo, h)
         fresnel = self.fresnel(f0, f90, dr.dot(wi, h), self.eta(inside))
         value = fresnel * value * under + diffuse / dr.pi
         density = density * gloss * (dr.max(fresnel) if self.transmission else 1.0)
         if self.coat:
             f = dr.power(dr.clip(1 - dr.dot(wi, h), 0, 1), 5)
-            coated, by_coat = self.lobe(self.coat_alpha, wi, wo, h)
+            coated, by_coat = self.lobe(self.coat_alpha, self.coat_alpha, wi, wo, h)
             value += self.coat * dr.lerp(0.04, 1.0, f) * coated
             density += by_coat * coat
-        density += (1 - gloss - coat) * wo.z / dr.pi
+        if self.has_sheen:
+            squared = dr.maximum(h.x * h.x + h.y * h.y, 1e-20)
+            distribution = (2 + 1 / self.sheen_alpha) * dr.power(squared, 0.5 / self.sheen_alpha) / (2 * dr.pi)
+            masking = 1 + sheen_masking(dr, wi.z, self.sheen_alpha) + sheen_masking(dr, wo.z, self.sheen_alpha)
+            value += self.sheen_scale * (distribution / (masking * 4 * wi.z * dr.maximum(wo.z, 1e-6)))
+        density += of_sheen / (2 * dr.pi)
+        density += (1 - gloss - coat - of_sheen) * wo.z / dr.pi
         is_above = (wi.z > 0) & (wo.z > 0)
         return dr.select(is_above, value * wo.z, 0.0), dr.select(is_above, density, 0.0)
 
@@ -179,22 +332,29 @@ class Gltf(mi.BSDF):
         if self.transmission:
             wi.z = dr.abs(wi.z)
         wi.z = dr.select(wi.z > 0, dr.maximum(wi.z, 1e-4), wi.z)
-        return wi, inside
+        return self.in_frame(wi, -self.rotation), inside
+
+    def in_frame(self, v, angle):
+        """Turned about the normal, so that x is the direction of the anisotropy, and back."""
+        c, s = math.cos(angle), math.sin(angle)
+        return mi.Vector3f(c * v.x - s * v.y, s * v.x + c * v.y, v.z) if self.strength else v
 
     def sample(self, ctx, si, sample1, sample2, active):
         wi, inside = self.turned(si)
-        f0, f90, _, through, _, gloss, coat = self.parts(wi.z)
+        f0, f90, _, through, _, gloss, coat, of_sheen = self.parts(wi)
         is_gloss, is_coat = sample1 < gloss, (sample1 >= gloss) & (sample1 < gloss + coat)
-        alpha = dr.select(is_coat, self.coat_alpha, self.alpha)
-        stretched = dr.normalize(mi.Vector3f(alpha * wi.x, alpha * wi.y, wi.z))
+        is_sheen = (sample1 >= gloss + coat) & (sample1 < gloss + coat + of_sheen)
+        along_x, along_y = (dr.select(is_coat, self.coat_alpha, alpha) for alpha in (self.along, self.alpha))
+        stretched = dr.normalize(mi.Vector3f(along_x * wi.x, along_y * wi.y, wi.z))
         height = 1 - sample2.y * (1 + stretched.z)
         level = dr.safe_sqrt((1 - height) * (1 + height))
         sine, cosine = dr.sincos(2 * dr.pi * sample2.x)
         h = mi.Vector3f(level * cosine, level * sine, height) + stretched
-        h = dr.normalize(mi.Vector3f(alpha * h.x, alpha * h.y, dr.maximum(h.z, 0)))
+        h = dr.normalize(mi.Vector3f(along_x * h.x, along_y * h.y, dr.maximum(h.z, 0)))
         along = dr.dot(wi, h)
         reflected = dr.normalize(2 * along * h - wi)
         wo = dr.select(is_gloss | is_coat, reflected, mi.warp.square_to_cosine_hemisphere(sample2))
+        wo = dr.select(is_sheen, mi.warp.square_to_uniform_hemisphere(sample2), wo)
         eta = self.eta(inside)
         bs = dr.zeros(mi.BSDFSample3f)
         fresnel = self.fresnel(f0, f90, along, eta)
@@ -206,9 +366,8 @@ class Gltf(mi.BSDF):
         wo = dr.select(crosses, refracted, wo)
         value, density = self.evaluated(wi, wo, inside)
         weight = dr.select(density > 0, value / density, 0.0)
-        squared = self.alpha * self.alpha
         below = dr.maximum(-wo.z, 0)
-        unmasked = 2 * below / dr.maximum(below + dr.sqrt(squared + (1 - squared) * below * below), 1e-20)
+        unmasked = 2 * below / dr.maximum(below + self.root(self.along, self.alpha, wo), 1e-20)
         passed = through * (1 - fresnel) * (unmasked * eta * eta / (dr.maximum(1 - chance, 1e-6) * gloss))
         weight = dr.select(crosses, dr.select(wo.z < 0, passed, 0.0), weight)
         # No lamp's ray brings what comes through facets: as if it were sharp.
@@ -219,12 +378,12 @@ class Gltf(mi.BSDF):
         bs.eta = dr.select(crosses, 1 / eta, 1.0)
         if self.transmission:
             wo.z = dr.select(inside, -wo.z, wo.z)
-        bs.wo = wo
+        bs.wo = self.in_frame(wo, self.rotation)
         return bs, weight & (active & (bs.pdf > 0))
 
     def both(self, si, wo, active):
         wi, inside = self.turned(si)
-        wo = mi.Vector3f(wo)
+        wo = self.in_frame(mi.Vector3f(wo), -self.rotation)
         if self.transmission:
             wo.z = dr.select(inside, -wo.z, wo.z)
         value, density = self.evaluated(wi, wo, inside)
@@ -293,6 +452,14 @@ def walls(door=False):
     return all_walls
 
 
+def brushed(at, material, rows=192):
+    """A sphere with coordinates around it, and tangents along them."""
+    around = (np.pi * np.arange(2 * rows + 1) / rows)[None] + np.zeros((rows + 1, 1))
+    tangents = np.stack([-np.sin(around), 0 * around, np.cos(around), 0 * around + 1], -1).reshape(-1, 4)
+    uv = np.stack([around / (2 * np.pi), (np.arange(rows + 1) / rows)[:, None] + 0 * around], -1).reshape(-1, 2)
+    return sphere(at, rows=rows), {**material, "uv": uv, "tangents": tangents}
+
+
 METAL = {"base": (0.95, 0.75, 0.5), "metallic": 1.0}
 PLASTIC = {"base": (0.2, 0.4, 0.7)}
 GLASS = {"base": (1, 1, 1), "transmission": 1.0, "roughness": 0.0}
@@ -330,6 +497,37 @@ SCENES = {
     ),
     # Its own camera.
     "teapots": (None, "env", ((0, 20, 0), (0, 19.7126521, -0.9578263), 46.8265)),
+    "sheen": (
+        [FLOOR]
+        + [
+            (sphere((2.3 * i, 0, 0)), {"base": (0.3, 0.1, 0.1), "sheen": (0.9, 0.8, 0.6), "sheen_roughness": r, **more})
+            for i, r, more in ((-1, 0.3, {}), (0, 0.6, {}), (1, 1.0, {"coat": 0.8, "coat_roughness": 0.2}))
+        ],
+        "env",
+        VIEW,
+    ),
+    "anisotropy": (
+        [FLOOR]
+        + [
+            brushed((2.3 * i, 0, 0), {**base, "roughness": r, "anisotropy": strength, "rotation": rotation})
+            for i, base, r, strength, rotation in (
+                (-1, METAL, 0.25, 0.8, 0.0), (0, METAL, 0.4, 0.6, 1.0), (1, PLASTIC, 0.3, 0.9, math.pi / 2)
+            )
+        ],
+        "env",
+        VIEW,
+    ),
+    "iridescence": (
+        [FLOOR]
+        + [
+            (sphere((2.3 * i, 0, 0)), {**base, "roughness": r, "film": 1.0, "film_index": index, "film_thickness": t})
+            for i, base, r, index, t in (
+                (-1, METAL, 0.3, 1.5, 300.0), (0, {"base": (0.05,) * 3}, 0.15, 2.0, 450.0), (1, PLASTIC, 0.5, 1.8, 700.0)
+            )
+        ],
+        "env",
+        VIEW,
+    ),
 }
 
 
@@ -429,12 +627,27 @@ def gltf(parts, folder):
             "POSITION": add(positions.astype(np.float32), "VEC3", 5126),
             "NORMAL": add(normals.astype(np.float32), "VEC3", 5126),
         }
+        if "tangents" in m:
+            attributes["TANGENT"] = add(m["tangents"].astype(np.float32), "VEC4", 5126)
+            attributes["TEXCOORD_0"] = add(m["uv"].astype(np.float32), "VEC2", 5126)
         indices = add(triangles.astype(np.uint32), "SCALAR", 5125)
         primitives.append({"attributes": attributes, "indices": indices, "material": len(materials)})
         extensions = {"KHR_materials_specular": {"specularFactor": m["weight"]}} if "weight" in m else {}
         if "coat" in m:
             coat = {"clearcoatFactor": m["coat"], "clearcoatRoughnessFactor": m.get("coat_roughness", 0.0)}
             extensions["KHR_materials_clearcoat"] = coat
+        if "sheen" in m:
+            sheen = {"sheenColorFactor": m["sheen"], "sheenRoughnessFactor": m["sheen_roughness"]}
+            extensions["KHR_materials_sheen"] = sheen
+        if "anisotropy" in m:
+            stretch = {"anisotropyStrength": m["anisotropy"], "anisotropyRotation": m["rotation"]}
+            extensions["KHR_materials_anisotropy"] = stretch
+        if "film" in m:
+            extensions["KHR_materials_iridescence"] = {
+                "iridescenceFactor": m["film"],
+                "iridescenceIor": m["film_index"],
+                "iridescenceThicknessMaximum": m["film_thickness"],
+            }
         if "transmission" in m:
             extensions["KHR_materials_transmission"] = {"transmissionFactor": m["transmission"]}
             extensions["KHR_materials_volume"] = {"thicknessFactor": 1.0}
@@ -478,16 +691,26 @@ def theirs(parts, environment, view, bounces, control):
         own |= {k: m[k] for k in ("metallic", "transmission", "coat", "coat_roughness") if k in m}
         own["roughness"] = m.get("roughness", 1.0) + (0.1 if control == "roughness" else 0.0)
         own["index"] = 1.4 if control == "index" else 1.5
+        own |= {k: m[k] for k in ("sheen_roughness", "anisotropy", "rotation", "film", "film_index", "film_thickness") if k in m}
+        own |= {f"sheen_{c}": x for c, x in zip("rgb", m.get("sheen", ()))}
+        if control == "sheen" and "sheen" in m:
+            own["sheen_roughness"] = 0.5 * m["sheen_roughness"]
+        if control == "anisotropy" and "anisotropy" in m:
+            own["anisotropy"] = 0.25 * m["anisotropy"]
+        if control == "film" and "film" in m:
+            own["film_thickness"] = m["film_thickness"] + 100
         if "weight" in m:
             own = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(m["base"])}}
         properties = mi.Properties()
         properties["bsdf"] = mi.load_dict(own if "transmission" in m else {"type": "twosided", "bsdf": own})
         if "emission" in m:
             properties["emitter"] = mi.load_dict({"type": "area", "radiance": {"type": "rgb", "value": m["emission"]}})
-        mesh = mi.Mesh(f"part {number}", len(positions), len(triangles), has_vertex_normals=True, props=properties)
+        mesh = mi.Mesh(f"part {number}", len(positions), len(triangles), has_vertex_normals=True, has_vertex_texcoords="uv" in m, props=properties)
         parameters = mi.traverse(mesh)
         parameters["vertex_positions"] = positions.astype(np.float32).ravel()
         parameters["vertex_normals"] = normals.astype(np.float32).ravel()
+        if "uv" in m:
+            parameters["vertex_texcoords"] = m["uv"].astype(np.float32).ravel()
         parameters["faces"] = triangles.astype(np.uint32).ravel()
         parameters.update()
         scene[f"part{number}"] = mesh
