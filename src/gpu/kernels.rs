@@ -212,6 +212,26 @@ mod tests {
         }
     }
 
+    /// Where no material has sheen, anisotropy or a film, kernels have nothing of them.
+    #[test]
+    fn without_layers_nothing_of_them_is_in_kernels() {
+        let has = |layers: bool| -> Vec<&str> {
+            let pages = Pages { cache: 1, texels: 1, opacity: true, gloss: true, layers, levels: true, hides: true };
+            let of_layers = |file: &str| {
+                let text = source(file, pages);
+                ["SHEENS + ", "film_index", "alpha_along", "STRETCHED + ", "sheen_masking"]
+                    .iter()
+                    .any(|part| text.contains(part))
+            };
+            KERNELS.iter().filter(|kernel| of_layers(kernel.file)).map(|kernel| kernel.name).collect()
+        };
+        assert_eq!(has(false), Vec::<&str>::new());
+        let with = has(true);
+        for name in ["shade", "add_light", "generate_glossy", "generate_path"] {
+            assert!(with.contains(&name), "{name} is not in {with:?}");
+        }
+    }
+
     /// The device checks the limit when pipelines are made, and panics where no one asked for its errors.
     #[test]
     fn as_many_pages_as_are_promised_can_be_bound() {
