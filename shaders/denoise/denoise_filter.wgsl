@@ -29,7 +29,7 @@ fn exp_of_minus(x: f32) -> f32 {
     p = barrier(p * g) + 0.0013333558;
     p = barrier(p * g) + 0.009618129;
     p = barrier(p * g) + 0.05550411;
-    p = barrier(p * g) + 0.24022651;
+    p = barrier(p * g) + 0.2402265;
     p = barrier(p * g) + 0.6931472;
     p = barrier(p * g) + 1.0;
     return bitcast<f32>(bitcast<u32>(p) - (u32(whole) << 23u));

@@ -28,7 +28,7 @@ fn exp_of_minus(x: f32) -> f32 {
     let whole = (y + 0.5).floor();
     let g = whole - y;
     // 2^g of -0.5..0.5 by its series: ln(2)^k / k!.
-    let series = [0.0013333558, 0.009618129, 0.05550411, 0.24022651, std::f32::consts::LN_2, 1.0];
+    let series = [0.0013333558, 0.009618129, 0.05550411, 0.2402265, std::f32::consts::LN_2, 1.0];
     let p: f32 = series.into_iter().fold(0.0001540353, |p, coefficient| p * g + coefficient);
     f32::from_bits(p.to_bits() - ((whole as u32) << 23))
 }

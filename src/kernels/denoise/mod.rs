@@ -14,10 +14,11 @@ pub use advance::push;
 pub use buffers::{BUFFERS, LAYERS, LEAST_ALBEDO, TALLIES};
 pub use vary::variance_of_mean;
 
+use super::bound::Bound;
 use super::layout::{DenoiseGiven, DenoiseLit, DenoiseOwn, DenoisePast, DenoiseSecond, DenoiseSeen};
-use super::table::{Family, FamilyBuffer, words};
+use super::table::{Family, FamilyBuffer, Target, words};
 use crate::kernels;
-use crate::schedule::{Over, Own};
+use crate::schedule::{ExecutorError, Over, Own};
 use buffers::Buffers;
 
 /// Levels of the filter; the pixels of level k are 2^k apart.
@@ -29,12 +30,12 @@ kernels! {
     /// The kernels.
     static KERNELS, names;
 
-    denoise_begin: "denoise/denoise_begin" Own [] |b, t| Ok(run(names::denoise_begin, b.own(), words(t.buffers)?));
-    denoise_advance: "denoise/denoise_advance" Own [] |b, t| Ok(run(names::denoise_advance, b.own(), words(t.buffers)?));
-    denoise_steady: "denoise/denoise_steady" Own [] |b, t| Ok(run(names::denoise_steady, b.own(), words(t.buffers)?));
-    denoise_vary: "denoise/denoise_vary" Own [] |b, t| Ok(run(names::denoise_vary, b.own(), words(t.buffers)?));
-    denoise_filter: "denoise/denoise_filter" Own [] |b, t| Ok(run(names::denoise_filter, b.own(), words(t.buffers)?));
-    denoise_join: "denoise/denoise_join" Own [] |b, t| Ok(run(names::denoise_join, b.own(), words(t.buffers)?));
+    denoise_begin: "denoise/denoise_begin" Own [] |b, t| twin(names::denoise_begin, b, t);
+    denoise_advance: "denoise/denoise_advance" Own [] |b, t| twin(names::denoise_advance, b, t);
+    denoise_steady: "denoise/denoise_steady" Own [] |b, t| twin(names::denoise_steady, b, t);
+    denoise_vary: "denoise/denoise_vary" Own [] |b, t| twin(names::denoise_vary, b, t);
+    denoise_filter: "denoise/denoise_filter" Own [] |b, t| twin(names::denoise_filter, b, t);
+    denoise_join: "denoise/denoise_join" Own [] |b, t| twin(names::denoise_join, b, t);
 }
 
 /// Number of the buffer of what pixels show.
@@ -116,6 +117,11 @@ pub fn steps([width, height]: [u32; 2], remembers: bool) -> Vec<Own> {
     }
     steps.push(step(names::denoise_join, frame));
     steps
+}
+
+/// What a row of the table runs.
+fn twin(kernel: &str, bound: &Bound, target: &mut Target) -> Result<(), ExecutorError> {
+    words(target.buffers).map(|words| run(kernel, bound.own(), words))
 }
 
 /// Runs the twin of a kernel.

@@ -115,7 +115,7 @@ mod tests {
     /// Directions to an environment are drawn by luminance, so that samples may differ in colour alone.
     #[test]
     fn colours_of_one_luminance_vary() {
-        let color = |k: u32| if k % 2 == 0 { [1.0 / 0.2126, 0.0, 0.0] } else { [0.0, 0.0, 1.0 / 0.0722] };
+        let color = |k: u32| if k.is_multiple_of(2) { [1.0 / 0.2126, 0.0, 0.0] } else { [0.0, 0.0, 1.0 / 0.0722] };
         let p = of((0..10).map(color));
         assert!(variance_of_mean(&p).is_some_and(|variance| variance > 0.1), "{p:?}");
     }
