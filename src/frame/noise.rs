@@ -1,7 +1,7 @@
 //! Adaptive sampling: pixels take samples until their noise is below a part of their value.
 //!
 //! The noise of a pixel is the standard error of its mean luminance, by the variance of the means of rounds of
-//! [`ROUND`] samples (Welford, "Note on a Method for Calculating Corrected Sums of Squares and Products", 1962).
+//! [`ROUND`] samples ([`Welford`]).
 //! Samples of a round are spread evenly, so rounds vary less than as many samples that are not, and the mean of rounds
 //! less still than independent ones: the error comes out at about half of what is found.
 //!
@@ -12,6 +12,7 @@
 use crate::frame::luminance;
 use crate::kernels::FrameExecutor;
 use crate::kernels::noise::{BLOCK, FAMILY, STOPPED, stop};
+use crate::math::welford::Welford;
 use crate::schedule::{ExecutorError, Step};
 use rayon::prelude::*;
 
@@ -25,21 +26,15 @@ pub const LEAST: u32 = 2 * ROUND;
 /// Means of a pixel's rounds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Rounds {
-    /// Their mean.
-    mean: f32,
-    /// The sum of their squared differences from it.
-    squares: f32,
+    means: Welford,
     /// Luminance summed over the batch before the round at hand.
-    before: f32,
+    before: f64,
 }
 
 impl Rounds {
-    /// Takes the sum of luminance over the batch after round `number`, from 1.
-    fn take(&mut self, sum: f32, number: u32) {
-        let value = (sum - self.before) / ROUND as f32;
-        let off = value - self.mean;
-        self.mean += off / number as f32;
-        self.squares += off * (value - self.mean);
+    /// Takes the sum of luminance over the batch after a round.
+    fn take(&mut self, sum: f64) {
+        self.means.push((sum - self.before) / f64::from(ROUND));
         self.before = sum;
     }
 }
@@ -99,10 +94,10 @@ impl Noise {
             for (index, (pixel, radiance)) in pixels.iter_mut().zip(radiance).enumerate() {
                 let block = index % width / BLOCK;
                 if stopped[block] == 0 {
-                    pixel.take(luminance([0, 1, 2].map(|k| f64::from(radiance[k]))) as f32, number);
+                    pixel.take(luminance([0, 1, 2].map(|k| f64::from(radiance[k]))));
                     let [squares, values] = &mut sums[block];
-                    *squares += f64::from(pixel.squares);
-                    *values += f64::from(pixel.mean) * f64::from(pixel.mean);
+                    *squares += pixel.means.squares;
+                    *values += pixel.means.mean * pixel.means.mean;
                 }
                 if ends_batch {
                     pixel.before = 0.0;

@@ -8,3 +8,4 @@ pub mod median;
 pub mod octahedral;
 pub mod random;
 pub mod sampling;
+pub mod welford;
