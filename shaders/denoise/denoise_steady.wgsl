@@ -1,5 +1,5 @@
-// Has the long average of a layer give way to the short one as far as their difference over a neighbourhood is more than
-// chance. Differences are taken pixel by pixel: what both averages show there falls out.
+// Has the long average of a layer give way to the short one as far as their difference over a neighbourhood is more
+// than chance. Differences are taken pixel by pixel: what both averages show there falls out.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "denoise/denoise.wgsl"

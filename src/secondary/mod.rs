@@ -13,8 +13,8 @@ use crate::kernels::table::Family;
 
 pub use choice::{EffectMethods, Method};
 
-/// The kernels of all methods, those that denoise, and those that stop pixels: what is compared on both executors beside
-/// those that all frames take.
+/// The kernels of all methods, those that denoise, and those that stop pixels: what is compared on both executors
+/// beside those that all frames take.
 pub static FAMILIES: &[&Family] = &[
     #[cfg(feature = "lab")]
     &df::kernels::FAMILY,

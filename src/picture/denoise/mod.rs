@@ -18,12 +18,12 @@
 //! are too few to tell it geometry alone weights neighbours, and a bright sample is no firefly if there was another
 //! around it in the last frames.
 //!
-//! *Practice.* Every step of the filter is a kernel with a twin ([`crate::kernels::denoise`]): the executor that rendered
-//! a frame filters it, and both executors give the same bits. Guides are read back and given to it again, in f32
-//! relative to the camera ([`given`]); where surfaces were before is found on the host in f64 ([`reproject`]). Around
-//! the filter go the sky, emission, and light on albedos below [`LEAST_ALBEDO`], black among them. What is not finite
-//! never enters a history and is counted. `--taa` ([`Taa`]) averages frames whose samples lie at different points of
-//! the pixels, after or without denoising.
+//! *Practice.* Every step of the filter is a kernel with a twin ([`crate::kernels::denoise`]): the executor that
+//! rendered a frame filters it, and both executors give the same bits. Guides are read back and given to it again, in
+//! f32 relative to the camera ([`given`]); where surfaces were before is found on the host in f64 ([`reproject`]).
+//! Around the filter go the sky, emission, and light on albedos below [`LEAST_ALBEDO`], black among them. What is not
+//! finite never enters a history and is counted. `--taa` ([`Taa`]) averages frames whose samples lie at different
+//! points of the pixels, after or without denoising.
 
 mod given;
 mod grid;
@@ -98,8 +98,8 @@ impl Denoiser {
         &mut all[layer * pixels..(layer + 1) * pixels]
     }
 
-    /// Filters `radiance`, the mean of a frame's samples, for which `guides` were taken, on the host. Returns the number
-    /// of values in histories that were not finite.
+    /// Filters `radiance`, the mean of a frame's samples, for which `guides` were taken, on the host. Returns the
+    /// number of values in histories that were not finite.
     pub fn frame(&mut self, guides: Guides, radiance: &mut [[f32; 3]]) -> u64 {
         let is_here = self.noted.take().is_none();
         let given = self.begin(&guides, radiance, is_here);
