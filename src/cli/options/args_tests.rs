@@ -29,10 +29,10 @@ fn the_definition_is_consistent() {
 }
 
 #[test]
-fn without_options_settings_are_the_defaults() {
+fn without_options_settings_are_those_of_previews() {
     // The adapter may be that of the environment.
     let adapter = walk("").unwrap().adapter;
-    assert_eq!(walk("").unwrap(), Settings { adapter, ..Settings::default() });
+    assert_eq!(walk("").unwrap(), Settings { adapter, ..Settings::from_options("--quality preview").unwrap() });
 }
 
 #[test]
