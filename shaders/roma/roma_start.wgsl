@@ -1,13 +1,5 @@
 // Where a ray starts in base maps, which overlap. Twin: src/secondary/roma/twin.rs.
 
-// The normal of the surface that a ray leaves.
-fn start_normal(index: u32) -> vec3<f32> {
-    if own.is_path != 0u {
-        return surfaces[index].normal;
-    }
-    return seen_surfaces[index].normal;
-}
-
 // Cells before its sides at which a level ends for ray `index`.
 fn margin_of(index: u32) -> f32 {
     let side = f32(own.cells);
@@ -23,7 +15,7 @@ fn lift_of(lift: f32, height: f32) -> f32 {
 fn near_end(index: u32, ray: Ray, cells: u32) -> f32 {
     let d = ray.direction;
     let length = square_root(barrier(barrier(barrier(d.x * d.x) + barrier(d.y * d.y)) + barrier(d.z * d.z)));
-    let l = start_level_of(ray.origin, start_normal(index), margin_of(index));
+    let l = start_level_of(ray.origin, seen_surfaces[index].normal, margin_of(index));
     if l >= own.levels {
         return T_INFINITE;
     }

@@ -1,7 +1,6 @@
 // Answers the pass's rays by ray-aligned occupancy maps, each by that of its stratum. What is met is written as a hit
 // of no triangle, but where rays are sifted: there, those that meet nothing are ended, and others are traced up to
-// own.near cells from their start. Where pilots have been traced, these count for what maps get wrong. Of rays of which
-// maps answer what they know, those that they do not are traced.
+// own.near cells from their start. Where pilots have been traced, these count for what maps get wrong.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
@@ -13,9 +12,6 @@
 #include "roma/roma_walk.wgsl"
 #include "roma/roma_pilot.wgsl"
 #include "roma/roma_write.wgsl"
-
-// Density over solid angles of the directions of wide rays at most: those that are drawn around a normal have 1 / pi.
-const WIDE: f32 = 0.5;
 
 // Ends a ray that maps find free, and says whether they do; what they do not is traced.
 fn sift(index: u32, ray: Ray, found: Answer) -> bool {
@@ -31,24 +27,6 @@ fn sift(index: u32, ray: Ray, found: Answer) -> bool {
         hits[index].t = min(ray.t_max, near_end(index, ray, own.near));
     }
     return false;
-}
-
-// Answers a ray that maps find free, or a wide one that meets something far enough from its start to be known, and says
-// whether they do. What is met is known to a cell: too little for rays of a sharp lobe.
-fn know(index: u32, ray: Ray, found: Answer) -> bool {
-    if found.t < 0.0 {
-        if found.is_known {
-            hits[index].t = ANSWERED;
-        }
-        return found.is_known;
-    }
-    let is_wide = own.is_path == 0u || densities[index] <= WIDE;
-    if !is_wide || found.t < near_end(index, ray, own.near) {
-        return false;
-    }
-    write(index, found);
-    hits[index].t = ANSWERED;
-    return true;
 }
 
 // Counts a pilot, of n rays one, by m + n (e - m), where m is what maps say and e what tracing says: 1, it is free, or
@@ -74,18 +52,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocat
         let ray = rays[index];
         let is_far = own.part == ROMA_FAR;
         let is_sifted = own.part == ROMA_SIFT;
-        let is_known = own.part == ROMA_KNOWN;
-        let from_start = is_sifted || is_known;
         // What has met something is not asked again, nor what was traced to its end or answered; pilots are traced.
         let is_done = hits[index].id != NONE || hits[index].t == ANSWERED || hits[index].t >= ray.t_max;
         if ray.t_min <= ray.t_max && !(is_far && is_done) && !(is_sifted && is_pilot(index)) {
-            let found = answer(index, ray, nearest(index, ray), select(ray.t_min, hits[index].t, is_far), from_start);
+            let found = answer(index, ray, nearest(index, ray), select(ray.t_min, hits[index].t, is_far), is_sifted);
             // What has been traced is not answered, though maps go on with it or correct it.
             var is_answered = own.part == ROMA_WHOLE || !is_traced(index, ray);
             if is_sifted {
                 is_answered = sift(index, ray, found);
-            } else if is_known {
-                is_answered = know(index, ray, found);
             } else if own.part == ROMA_CORRECT && is_pilot(index) {
                 correct(index, found);
             } else {

@@ -101,7 +101,7 @@ fn nearest(index: u32, ray: Ray) -> Taken {
     if own.steps > 0u {
         return Taken(map, d, own.steps);
     }
-    let normal = start_normal(index);
+    let normal = seen_surfaces[index].normal;
     let length = length_of(d);
     let snapped = barrier3(select(-length, length, d.z >= 0.0) * roma_maps[map].direction.xyz);
     let above = barrier(barrier(snapped.x * normal.x) + barrier(snapped.y * normal.y)) + barrier(snapped.z * normal.z);
@@ -115,7 +115,7 @@ fn nearest(index: u32, ray: Ray) -> Taken {
 // Rays are off their surface by the level's lift where they enter it, so that no level meets what they leave; with
 // `is_sifted` by less, and must be free to their own ends.
 fn answer(index: u32, ray: Ray, taken: Taken, begin: f32, is_sifted: bool) -> Answer {
-    let normal = start_normal(index);
+    let normal = seen_surfaces[index].normal;
     let maps = own.k * own.k;
     let direction = taken.direction;
     let side = f32(own.cells);

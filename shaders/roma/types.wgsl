@@ -7,13 +7,12 @@ struct RomaOwn {          // what a kernel is told
     levels: u32,          // base maps
     samples: u32,         // look-ups of the base map a cell
     steps: u32,           // columns that a ray passes before it is finished snapped; 0: it is snapped
-    // cells of the base map that holds a ray's start, up to where it is traced, or within which what maps meet is not
-    // taken; NONE: to its end. roma_measure: in one of a map
+    // cells of the base map that holds a ray's start, up to where it is traced; NONE: to its end. roma_measure: in
+    // one of a map
     near: u32,
     part: u32,            // which part of rays roma_trace answers, ROMA_*
     is_part: u32,         // 1: rays that leave the coarsest base map are not answered, 0: it holds the scene
     pilots: u32,          // of rays that maps answer one in so many is traced to its end; 0: none
-    is_path: u32,         // 1: the normal of the surface that a ray leaves is in its own, not in the set before
 }
 
 struct RomaMap {          // A ray-aligned map. Columns run along its z.
@@ -27,6 +26,4 @@ const ROMA_FAR: u32 = 1u;          // maps answer rays from where they have been
 const ROMA_SIFT: u32 = 2u;         // maps answer those rays alone that meet nothing
 // maps answer whole rays; pilots, which have been traced, count for what maps get wrong
 const ROMA_CORRECT: u32 = 3u;
-// maps answer rays that meet nothing, and wide ones that meet something beyond own.near; others are traced
-const ROMA_KNOWN: u32 = 4u;
 const HANDOVERS: u32 = 6u;    // distances up to which rays may be traced, roma_measure

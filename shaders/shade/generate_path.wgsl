@@ -70,8 +70,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     throughput[index] = vec4<f32>(carried, before.w);
     densities[index] = density;
     start_hit(index, ray.t_max, seen_hits[index].id);
-    // Of the surface that the ray leaves, which is overwritten: for methods, until a hit is found.
-    surfaces[index].normal = surface.normal;
     if ray.t_max > 0.0 {
         widen_reflected(index, density, alpha);
     }

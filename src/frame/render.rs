@@ -7,7 +7,7 @@ use super::half_rate;
 use super::noise::{LEAST, Noise};
 use super::{
     Accumulation, BATCH_SAMPLES, Effects, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState,
-    Pixels, Plan, camera_view,
+    Pixels, camera_view,
 };
 use crate::counters::{Counters, Record};
 use crate::kernels::Lod;
@@ -364,31 +364,20 @@ fn bounces(
     let last = if bends(engine) { count + 1 } else { count };
     for (number, names) in (2..=last).zip(&*PATHS) {
         let (of_lamp, is_lit) = (to_lamps(number), number <= count);
-        let (mut rays, mut lit) = (0, Vec::new());
+        let mut rays = 0;
         records.pass(engine, names[0], |r, stats| {
-            let path = Pass::Path(number);
-            let plan = if is_lit { methods.plan(r, path)? } else { Plan::exact(path) };
-            stats.methods.add(&plan.methods);
             let from = if is_lit { Pass::PathShadow } else { Pass::BounceShadow };
             stats.add(r.executor.run(from(Lamp::Sun), &[Step::Continue(number)], &r.cache.states)?);
             let before = stats.rays_traced;
-            r.trace(frame, path, [&plan.before, &[]], stats)?;
-            (rays, lit) = (stats.rays_traced - before, plan.light);
-            r.note_answers(path, false)?;
-            r.resolve(path, stats)?;
+            r.trace(frame, Pass::Path(number), [&[], &[]], stats)?;
+            rays = stats.rays_traced - before;
+            r.resolve(Pass::Path(number), stats)?;
             let (shadow, environment) = (r.settings.effects.shadow, r.draws_environment());
             // What lamps bring to the hits before is weighted where these rays meet it.
             let shading =
                 Shading { sun: is_lit && !shadow, sky: false, emission: true, miss: true, environment, gloss: true };
             r.shade(of_lamp(Lamp::Sun), shading, stats)
         })?;
-        if !lit.is_empty() {
-            // What methods met: paths end there.
-            records.pass(engine, names[1], |r, stats| {
-                stats.add(r.executor.run(of_lamp(Lamp::Sun), &lit, &r.cache.states)?);
-                Ok(())
-            })?;
-        }
         if rays == 0 || !is_lit {
             // All paths have ended.
             break;

@@ -28,7 +28,7 @@ pub struct Plan {
     pub after: Vec<Step>,
     /// Adds the light that rays bring, of passes whose hits are not shaded.
     pub add: Step,
-    /// What lights those hits of answered rays that are lit, in place of rays to lamps. Paths end at them.
+    /// Where all rays are answered and their hits are lit: what does that, in place of rays to lamps.
     pub light: Vec<Step>,
     /// The methods that have a part in this.
     pub methods: Names,

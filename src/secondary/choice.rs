@@ -39,22 +39,15 @@ pub struct EffectMethods {
     pub shadow: Method,
     /// Rays to the environment.
     pub environment: Method,
-    /// With more than one bounce, what else of the rays from the second hit of a path on is answered, of any effect.
-    pub bounces: Method,
 }
 
 /// The effects that methods answer.
-const EFFECTS: [&str; 5] = ["ao", "diffuse", "shadow", "environment", "bounces"];
+const EFFECTS: [&str; 4] = ["ao", "diffuse", "shadow", "environment"];
 
 impl EffectMethods {
     /// All rays are traced.
-    pub const EXACT: Self = Self {
-        ao: Method::Exact,
-        diffuse: Method::Exact,
-        shadow: Method::Exact,
-        environment: Method::Exact,
-        bounces: Method::Exact,
-    };
+    pub const EXACT: Self =
+        Self { ao: Method::Exact, diffuse: Method::Exact, shadow: Method::Exact, environment: Method::Exact };
 
     /// A method for the effects that it suits: rays to the sun are among them where they are asked for alone, because
     /// the error of maps, a few cells, is wider than a shadow's edge.
@@ -97,8 +90,8 @@ impl EffectMethods {
     }
 
     /// Effects and their methods.
-    pub fn list(self) -> [(&'static str, Method); 5] {
-        let methods = [self.ao, self.diffuse, self.shadow, self.environment, self.bounces];
+    pub fn list(self) -> [(&'static str, Method); 4] {
+        let methods = [self.ao, self.diffuse, self.shadow, self.environment];
         std::array::from_fn(|i| (EFFECTS[i], methods[i]))
     }
 
@@ -125,8 +118,7 @@ impl EffectMethods {
             "ao" => &mut self.ao,
             "diffuse" => &mut self.diffuse,
             "shadow" => &mut self.shadow,
-            "environment" => &mut self.environment,
-            _ => &mut self.bounces,
+            _ => &mut self.environment,
         }
     }
 }
@@ -134,11 +126,8 @@ impl EffectMethods {
 /// Whether a method can answer the rays of an effect.
 fn can_answer(method: Method, effect: &str) -> bool {
     match method.name() {
-        "exact" | "displacement" => true,
-        // No rate says what it would save from the second hit on.
-        "auto" => effect != "bounces",
+        "exact" | "auto" | "displacement" => true,
         "roma" => effect != "environment",
-        "sift" => matches!(effect, "ao" | "shadow" | "bounces"),
         "dvf" => effect == "environment",
         _ => matches!(effect, "ao" | "shadow"),
     }
@@ -202,13 +191,12 @@ mod tests {
             "shadow=df",
             "sift",
             "ao=roma,shadow=sift,environment=dvf",
-            "shadow=roma,bounces=sift",
         ] {
             assert_eq!(text.parse::<EffectMethods>().unwrap().to_string(), text);
         }
         let read = |text: &str| text.parse::<EffectMethods>().unwrap();
-        assert_eq!(read("ao=sift,bounces=sift").to_string(), "sift");
-        assert_eq!(read("roma, ao = exact").to_string(), "diffuse=roma,bounces=roma");
+        assert_eq!(read("ao=sift").to_string(), "sift");
+        assert_eq!(read("roma, ao = exact").to_string(), "diffuse=roma");
         assert_eq!(read("roma,shadow=roma"), EffectMethods::every(Method::Roma));
     }
 
@@ -221,19 +209,16 @@ mod tests {
         }
         let chosen: EffectMethods = "roma".parse().unwrap();
         assert_eq!((chosen.ao, chosen.diffuse, chosen.environment), (Method::Roma, Method::Roma, Method::Exact));
-        assert_eq!(chosen.bounces, Method::Roma);
-        assert_eq!(EffectMethods::of(Method::Auto).bounces, Method::Exact);
         assert_eq!("ao=roma,shadow=roma".parse::<EffectMethods>().unwrap().shadow, Method::Roma);
     }
 
     #[test]
     fn what_no_method_answers_is_refused() {
         for (text, says) in [
-            ("glow=roma", "known: ao, diffuse, shadow, environment, bounces"),
+            ("glow=roma", "known: ao, diffuse, shadow, environment"),
             ("ao=dvf", "dvf does not answer rays of ao; known: exact, roma, auto, sift, df, displacement"),
             ("environment=roma", "known: exact, auto, dvf, displacement"),
             ("diffuse=sift", "known: exact, roma, auto, displacement"),
-            ("bounces=auto", "known: exact, roma, sift, displacement"),
             ("ao=luck", "known: exact"),
             ("ao=roma,df", "EFFECT=df"),
         ] {

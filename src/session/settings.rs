@@ -221,8 +221,7 @@ settings! {
         /// traced. `df`: those of `ao` by
         /// distance fields, a baseline. `dvf`: those to the environment by a field of visibility, made on the first
         /// walk. `displacement`: by what `bake-displacement` has put into the scene file, mostly rays against bricks
-        /// that are not resident. Rays of `shadow` are traced unless asked: shadow=roma. bounces=roma answers rays from
-        /// the second hit of a path on alone.
+        /// that are not resident. Rays of `shadow` are traced unless asked: shadow=roma.
         secondary: EffectMethods = EffectMethods::EXACT, "--secondary METHOD", Rule::Any, "", Methods, Common;
         /// With --secondary auto: the error that methods may have, as a mean FLIP, 0.05, or as a percentage, 5%. FLIP
         /// is that of the picture against the exact one of the same rays, a percentage 100 times the root of an
@@ -411,15 +410,11 @@ impl Settings {
             ("roma.bom", maps || fields, "--secondary roma, sift or df"),
             ("roma.k", by_maps(chosen.ao), "--secondary ao=roma or ao=sift"),
             ("roma.shadow_k", by_maps(chosen.shadow), "--secondary shadow=roma or shadow=sift"),
-            (
-                "roma.diffuse_k",
-                by_maps(chosen.diffuse) || by_maps(chosen.bounces),
-                "--secondary diffuse=roma or bounces=roma",
-            ),
+            ("roma.diffuse_k", by_maps(chosen.diffuse), "--secondary diffuse=roma"),
             ("roma.one_in", chosen.ao == Method::Sift, "--secondary ao=sift"),
             ("roma.error", chosen.has(Method::Sift), "--secondary sift"),
             ("roma.", maps, "--secondary roma or sift"),
-            ("rsm.", [chosen.diffuse, chosen.bounces].contains(&Method::Roma), "--secondary diffuse=roma"),
+            ("rsm.", chosen.diffuse == Method::Roma, "--secondary diffuse=roma"),
             ("df.", fields, "--secondary df"),
             ("dvf.renew", chosen.has(Method::Dvf) && self.motion.is_some(), "--secondary dvf and --motion"),
             ("dvf.", chosen.has(Method::Dvf), "--secondary dvf"),
@@ -439,18 +434,12 @@ impl Settings {
     /// Says that no effect that is on has a method of those chosen.
     fn idle_methods(&self) -> Option<String> {
         let chosen = self.methods();
-        let EffectMethods { ao, diffuse, shadow, bounces, .. } = chosen;
+        let EffectMethods { ao, diffuse, shadow, .. } = chosen;
         let effects = self.effects;
-        let has_paths = (effects.diffuse || effects.glossy) && self.bounces.of(effects) > 1;
-        let is_on = [
-            (ao, effects.ao && !effects.environment),
-            (diffuse, effects.diffuse),
-            (shadow, effects.shadow),
-            (bounces, has_paths),
-        ];
+        let is_on = [(ao, effects.ao && !effects.environment), (diffuse, effects.diffuse), (shadow, effects.shadow)];
         let is_idle = chosen.has_maps() && is_on.iter().all(|(method, on)| !on || *method == Method::Exact);
         let list = chosen.list().into_iter().filter(|(_, method)| *method != Method::Exact);
-        let of: Vec<&str> = list.map(|(effect, _)| if effect == "bounces" { "path" } else { effect }).collect();
+        let of: Vec<&str> = list.map(|(effect, _)| effect).collect();
         let hint = match effects.shadow {
             true => format!("; shadows are traced unless --secondary shadow={} asks", Method::Roma),
             false => String::new(),

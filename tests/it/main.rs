@@ -87,7 +87,6 @@ mod secondary {
     mod dvf;
     mod dvf_paper;
     mod dvf_renew;
-    mod paths;
     mod roma;
     mod roma_diffuse;
 }

@@ -109,7 +109,6 @@ pub fn generate_path(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mu
     }
     let carried = throughput.par_iter_mut().zip(densities.par_iter_mut()).zip(own.surfaces.par_iter_mut());
     carried.enumerate().with_min_len(1024).for_each(|(index, ((carried, density), surface))| {
-        surface.normal = seen.surfaces[index].normal;
         let is_hit = seen.surfaces[index].leaf != crate::kernels::layout::NONE;
         let found = if is_hit { step(index, carried) } else { None };
         let Some(Step { ray, weight, density: own, alpha }) = found else {

@@ -15,8 +15,6 @@ names! {
         Diffuse = "diffuse",
         /// The light of the sky.
         Environment = "environment",
-        /// Paths of four bounces under sun and sky.
-        Path = "path",
     }
 }
 
@@ -34,7 +32,7 @@ settings! {
         quick: bool = false, "--quick", Rule::Any, "", Quality, Common;
         /// Switch one source of error at a time, with the same rays, and say which counts most, in place of the study.
         attribute: bool = false, "--attribute", Rule::Any, "", Measurement, Common;
-        /// What is studied, with commas between them: ao, shadow, diffuse, environment, path. [default: all]
+        /// What is studied, with commas between them: ao, shadow, diffuse, environment. [default: all]
         effects: Vec<Effect> = Vec::new(), "--effects LIST", Rule::Any, "", Effects, Common;
         /// Sizes of the cache, percent of all bricks, with commas between them. [default: 100,47,32,20,5; with --quick
         /// 100,20; with --attribute 100]

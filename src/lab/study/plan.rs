@@ -49,7 +49,7 @@ pub fn rays(effect: Effect, count: u32) -> String {
     match effect {
         Effect::Ao => format!("--ao-rays {count}"),
         Effect::Diffuse => format!("--diffuse-rays {count}"),
-        Effect::Shadow | Effect::Environment | Effect::Path => format!("--spp {count}"),
+        Effect::Shadow | Effect::Environment => format!("--spp {count}"),
     }
 }
 
@@ -60,9 +60,7 @@ pub fn ways(effect: Effect, has: Has, is_quick: bool) -> Vec<Way> {
     let mut ways: Vec<Way> = thinned(&RAYS).into_iter().map(|rays| Way::new("exact", rays, "")).collect();
     let name = effect.name();
     ways.extend([20, 200].map(|pixels| usual("threshold", format!("--schedule chc --query-threshold {pixels}"))));
-    if effect == Effect::Path {
-        ways.extend(later(has, &thinned(&[32, 64, 128])));
-    } else if has.occupancy && effect != Effect::Environment {
+    if has.occupancy && effect != Effect::Environment {
         let option = match effect {
             Effect::Ao => "--roma-k",
             Effect::Shadow => "--roma-shadow-k",
@@ -88,19 +86,18 @@ pub fn ways(effect: Effect, has: Has, is_quick: bool) -> Vec<Way> {
                 .map(|size| usual("df", format!("--secondary {name}=df --df-size {size}"))),
         );
     }
-    if matches!(effect, Effect::Environment | Effect::Path) {
+    if effect == Effect::Environment {
         let counts: &[u32] = if is_quick { &[1_000, 5_000] } else { &[20_000, 100_000, 400_000] };
         let dvf = |points: u32, rest: &str| {
-            usual("dvf", format!("--secondary environment=dvf --dvf-points {points} --dvf-count rounding{rest}"))
+            usual("dvf", format!("--secondary {name}=dvf --dvf-points {points} --dvf-count rounding{rest}"))
         };
         ways.extend(counts.iter().map(|&points| dvf(points, "")));
         ways.push(dvf(counts[1], " --dvf-rays 32"));
         ways.push(dvf(counts[1], " --dvf-region view"));
     }
     if has.displacement {
-        let whose = if effect == Effect::Path { "bounces" } else { name };
         ways.extend(["absent", "all"].map(|against| {
-            usual("displacement", format!("--secondary {whose}=displacement --displacement-against {against}"))
+            usual("displacement", format!("--secondary {name}=displacement --displacement-against {against}"))
         }));
     }
     if has.levels {
@@ -109,22 +106,6 @@ pub fn ways(effect: Effect, has: Has, is_quick: bool) -> Vec<Way> {
     ways.extend([1, USUAL].map(|rays| Way::new("denoised", rays, "--denoise")));
     ways.push(Way::new("denoised", 1, "--denoise --taa"));
     ways.push(Way::new("taa", 1, "--taa"));
-    ways
-}
-
-/// Ways of paths whose rays from the second hit on maps of so many cells answer; then of such whose first bounce ends
-/// in maps.
-fn later(has: Has, sizes: &[u32]) -> Vec<Way> {
-    let of = |method, options: String| Way::new(method, USUAL, format!("--secondary {options}"));
-    let by_size = |&size: &u32| {
-        [("roma", "bounces=roma"), ("sift", "bounces=sift"), ("roma", "diffuse=roma")]
-            .map(|(method, whose)| of(method, format!("{whose} --roma-size {size}")))
-    };
-    let mut ways: Vec<Way> = sizes.iter().filter(|_| has.occupancy).flat_map(by_size).collect();
-    if has.occupancy {
-        ways.push(of("roma", "bounces=roma --roma-diffuse-k 8".into()));
-        ways.push(of("roma", "shadow=roma,bounces=roma".into()));
-    }
     ways
 }
 
@@ -142,7 +123,7 @@ pub fn attributed(effect: Effect, has: Has) -> Vec<Way> {
         "--schedule chc --query-threshold 20".into(),
         some(&[("threshold", "--query-threshold 5")]),
     )];
-    if has.occupancy && !matches!(effect, Effect::Environment | Effect::Path) {
+    if has.occupancy && effect != Effect::Environment {
         let directions = match effect {
             Effect::Ao => "--roma-k 8",
             Effect::Shadow => "--roma-shadow-k 8",
@@ -170,23 +151,7 @@ pub fn attributed(effect: Effect, has: Has) -> Vec<Way> {
             some(&[("cells", "--df-size 128"), ("steps", "--df-steps 256"), ("offset", "--df-lift 1")]),
         ));
     }
-    if has.occupancy && effect == Effect::Path {
-        methods.push((
-            "roma",
-            "--secondary bounces=roma --roma-size 64".into(),
-            some(&[
-                ("cells", "--roma-size 128"),
-                ("directions", "--roma-diffuse-k 8"),
-                ("look-ups", "--roma-samples 4"),
-            ]),
-        ));
-        methods.push((
-            "sift",
-            "--secondary bounces=sift --roma-size 64".into(),
-            some(&[("cells", "--roma-size 128"), ("wrong answers", "--auto-error 0.5")]),
-        ));
-    }
-    if matches!(effect, Effect::Environment | Effect::Path) {
+    if effect == Effect::Environment {
         methods.push((
             "dvf",
             "--secondary environment=dvf --dvf-points 20000 --dvf-count rounding --dvf-octahedral 16".into(),
@@ -199,10 +164,9 @@ pub fn attributed(effect: Effect, has: Has) -> Vec<Way> {
         ));
     }
     if has.displacement {
-        let whose = if effect == Effect::Path { "bounces" } else { name };
         methods.push((
             "displacement",
-            format!("--secondary {whose}=displacement --displacement-against all"),
+            format!("--secondary {name}=displacement --displacement-against all"),
             some(&[
                 ("stand-ins", "--displacement-against absent"),
                 ("offset", "--displacement-near 8"),

@@ -55,20 +55,18 @@ impl Displacement {
         }
     }
 
-    /// Whether fields answer the rays of a pass, of frames with so many bounces.
-    fn answers(&self, pass: Pass, bounces: u32) -> bool {
-        let chosen = &self.chosen;
-        let of_lamp = |lamp| if lamp == Lamp::Environment { chosen.environment } else { chosen.shadow };
-        let methods = match pass {
-            Pass::Occlusion(_) => [chosen.ao; 2],
-            Pass::Diffuse(_) => [chosen.diffuse; 2],
-            Pass::Shadow(lamp) => [of_lamp(lamp); 2],
-            Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) if bounces > 1 => [of_lamp(lamp), chosen.bounces],
-            Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => [of_lamp(lamp); 2],
-            Pass::Path(_) => [chosen.bounces; 2],
-            Pass::Primary | Pass::Glossy => return false,
+    /// Whether fields answer the rays of a pass.
+    fn answers(&self, pass: Pass) -> bool {
+        let method = match pass {
+            Pass::Occlusion(_) => self.chosen.ao,
+            Pass::Diffuse(_) => self.chosen.diffuse,
+            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => match lamp {
+                Lamp::Environment => self.chosen.environment,
+                Lamp::Sun | Lamp::Emitter => self.chosen.shadow,
+            },
+            Pass::Primary | Pass::Glossy | Pass::Path(_) => return false,
         };
-        methods.contains(&Method::Displacement)
+        method == Method::Displacement
     }
 
     /// Gives the executor what it lacks; what the kernel is told.
@@ -137,7 +135,7 @@ impl Secondary for Displacement {
     }
 
     fn plan(&mut self, engine: &mut Engine, pass: Pass, plan: &mut Plan) -> Result<(), ExecutorError> {
-        if self.answers(pass, engine.settings.effects.bounces) {
+        if self.answers(pass) {
             plan.before.push(sift(&self.give(engine)?));
         }
         Ok(())

@@ -3,23 +3,14 @@
 use super::handover::{Handover, PILOTS, Trust};
 use super::maps::RomaMaps;
 use super::{Grid, LEAST_CELLS, LIFT, LONG_CELLS, Pilots, Role, RomaPart, RomaPass, RomaSettings, Sift};
-use crate::frame::{Displaced, Effects, Engine, FrameRecords, Plan, Secondary};
+use crate::frame::{Displaced, Engine, FrameRecords, Plan, Secondary};
 use crate::kernels::View;
 use crate::scene::Camera;
 use crate::schedule::{ExecutorError, Lamp, Pass, Report, Step};
-use crate::secondary::occupancy::{BaseMaps, BaseView, Bom, Cascades, Source};
+use crate::secondary::occupancy::{BaseMaps, BaseView, Bom, Source};
 use crate::secondary::rsm::answer::Rsm;
-use bricks::{MATERIAL_UNLIT, SceneFile};
+use bricks::SceneFile;
 use serde_json::{Value, json};
-use std::sync::Arc;
-
-/// What ray-aligned maps were made of, in a frame.
-struct Made {
-    grid: Grid,
-    levels: usize,
-    sample: u32,
-    cascades: Arc<Cascades>,
-}
 
 /// Rays answered by ray-aligned occupancy maps.
 #[derive(Default)]
@@ -32,7 +23,7 @@ pub struct Roma {
     pub rsm: Rsm,
     /// The ray-aligned maps that the executor was given last, of the present sample.
     maps: RomaMaps,
-    made: Option<Made>,
+    made: Option<(Grid, Role, usize)>,
     /// What was measured of the rays of ao, and of those from what is seen and from what that sees to lamps.
     handovers: [Handover; 3],
     /// Whether the pass at hand measures.
@@ -74,9 +65,8 @@ impl Roma {
         &self.handovers
     }
 
-    /// How the rays of `pass` are answered, whatever maps know of them; `None` where they are traced or
-    /// [`Self::later`].
-    fn pass_of(settings: &RomaSettings, pass: Pass) -> Option<RomaPass> {
+    /// How the rays of `pass` are answered; `None` where they are traced.
+    pub fn pass_of(settings: &RomaSettings, pass: Pass) -> Option<RomaPass> {
         match pass {
             Pass::Occlusion(_) => settings.occlusion,
             Pass::Diffuse(_) => settings.diffuse,
@@ -87,55 +77,23 @@ impl Roma {
         }
     }
 
-    /// How those of the rays of `pass` are answered that start at the second hit of a path or at one after it, and that
-    /// maps know.
-    fn later(settings: &RomaSettings, pass: Pass, effects: &Effects) -> Option<RomaPass> {
-        let is_later = match pass {
-            Pass::Path(_) => true,
-            Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => lamp != Lamp::Environment && effects.bounces > 1,
-            _ => false,
-        };
-        settings.bounces.filter(|_| is_later && Self::pass_of(settings, pass).is_none())
-    }
-
-    /// What maps do for such rays. In a cell that is marked there may be something that lets a ray pass, and what maps of
-    /// lamps know of a hit is what is lit by lamps that have one.
-    fn later_part(&self, engine: &Engine, pass: Pass, roma: RomaPass) -> RomaPart {
-        let RomaPass { grid, role, .. } = roma;
-        let is_known = is_solid(engine) && (pass.is_any_hit() || (!shines(engine) && self.rsm.left_out() == [0; 2]));
-        match role {
-            Role::Answer if is_known => RomaPart::Known { near: LEAST_CELLS as u32 * grid.base_per_cell() },
-            _ => RomaPart::Sift(Sift::default()),
-        }
-    }
-
     /// Has the executor take the maps of `pass` for rays that are `length` world units long at most, unless it has
     /// them; the step that then makes them. Levels are left out that such rays end in before they are off their
-    /// surface. `is_lasting`: all samples of a frame share them.
-    fn prepare(
-        &mut self,
-        engine: &mut Engine,
-        pass: RomaPass,
-        length: f64,
-        is_lasting: bool,
-    ) -> Result<Option<Step>, ExecutorError> {
+    /// surface.
+    fn prepare(&mut self, engine: &mut Engine, pass: RomaPass, length: f64) -> Result<Option<Step>, ExecutorError> {
         let Some(BaseView { frame, sample, seed, .. }) = self.base.view().copied() else { return Ok(None) };
-        let sample = if is_lasting { 0 } else { sample };
-        let grid = pass.grid;
+        let RomaPass { grid, role, .. } = pass;
         let cells = grid.base_cells();
         let cascades = self.base.assemble(&engine.scene, grid.size, cells)?.clone();
         let before = LIFT / grid.scale(cells);
         let is_of_use = |bom: &&Bom| before * bom.side() < length;
         let levels = cascades.levels.iter().take_while(is_of_use).count();
-        let is_same = |made: &Made| {
-            (made.grid, made.levels, made.sample) == (grid, levels, sample) && Arc::ptr_eq(&made.cascades, &cascades)
-        };
-        if self.made.as_ref().is_some_and(is_same) {
+        if self.made == Some((grid, role, levels)) {
             return Ok(None);
         }
         self.maps = RomaMaps::new(&cascades, levels, &frame, pass, (sample, seed));
         self.maps.give(&mut *engine.executor, &cascades)?;
-        self.made = Some(Made { grid, levels, sample, cascades });
+        self.made = Some((grid, role, levels));
         Ok(Some(self.maps.rotate()))
     }
 
@@ -152,28 +110,15 @@ impl Roma {
     }
 }
 
-/// Whether no ray passes through any surface.
-fn is_solid(engine: &Engine) -> bool {
-    let manifest = &engine.scene.resident().manifest;
-    !manifest.has_alpha_mask && !manifest.has_alpha_blend
-}
-
-/// Whether some surface shines by itself.
-fn shines(engine: &Engine) -> bool {
-    let resident = engine.scene.resident();
-    resident.manifest.has_emission || resident.materials.iter().any(|m| m.flags & MATERIAL_UNLIT != 0)
-}
-
 impl Secondary for Roma {
     fn name(&self) -> &'static str {
-        let passes = self.settings.map(|own| [own.occlusion, own.shadow, own.diffuse, own.bounces]).unwrap_or_default();
+        let passes = self.settings.map(|own| [own.occlusion, own.shadow, own.diffuse]).unwrap_or_default();
         if passes.iter().flatten().any(|pass| pass.role.is_help()) { "sift" } else { "roma" }
     }
 
     fn begin(&mut self, camera: &Camera, view: &View) {
         self.base.begin(camera.position, view);
-        // Another may have used the executor between frames.
-        self.made.take_if(|_| view.params.sample == 0);
+        self.made = None;
     }
 
     fn before_camera_rays(
@@ -182,33 +127,17 @@ impl Secondary for Roma {
         records: &mut FrameRecords,
         view: &View,
     ) -> Result<(), ExecutorError> {
-        let Some(settings) = self.settings else { return Ok(()) };
-        let effects = &engine.settings.effects;
-        let is_lit = effects.bounces > 1 && effects.has_bounces() && is_solid(engine) && !shines(engine);
-        let diffuse = settings.diffuse.filter(|_| effects.diffuse.is_some());
-        let later = settings.bounces.filter(|pass| pass.role == Role::Answer && is_lit);
-        let Some(RomaPass { grid, .. }) = diffuse.or(later) else { return Ok(()) };
-        let cascades = self.base.assemble(&engine.scene, grid.size, grid.base_cells())?;
-        self.rsm.prepare(engine, records, view, &settings.rsm, cascades)
+        let diffuse = self.settings.and_then(|settings| Some((settings.rsm, settings.diffuse?)));
+        let Some((settings, diffuse)) = diffuse.filter(|_| engine.settings.effects.diffuse.is_some()) else {
+            return Ok(());
+        };
+        let cascades = self.base.assemble(&engine.scene, diffuse.grid.size, diffuse.grid.base_cells())?;
+        self.rsm.prepare(engine, records, view, &settings, cascades)
     }
 
     fn plan(&mut self, engine: &mut Engine, pass: Pass, plan: &mut Plan) -> Result<(), ExecutorError> {
         self.is_measured = false;
-        let Some(settings) = self.settings else { return Ok(()) };
-        let later = Self::later(&settings, pass, &engine.settings.effects);
-        if let Some(roma) = later.filter(|roma| roma.role == Role::Answer || !pass.is_any_hit()) {
-            // They keep their own directions, whatever those of maps are.
-            plan.before.extend(self.prepare(engine, roma, f64::INFINITY, true)?);
-            let part = self.later_part(engine, pass, roma);
-            if pass.is_any_hit() {
-                plan.before.push(self.maps.trace(roma.steps, part));
-            } else {
-                plan.before.push(self.maps.trace_path(roma.steps, part));
-                plan.light = if matches!(part, RomaPart::Known { .. }) { self.rsm.light() } else { Vec::new() };
-            }
-            return Ok(());
-        }
-        let Some(roma) = Self::pass_of(&settings, pass).or(later) else { return Ok(()) };
+        let Some(roma) = self.settings.and_then(|settings| Self::pass_of(&settings, pass)) else { return Ok(()) };
         let length = match (pass, engine.settings.effects.occlusion) {
             (Pass::Occlusion(_), Some(occlusion)) => occlusion.length,
             _ => f64::INFINITY,
@@ -217,7 +146,7 @@ impl Secondary for Roma {
         if role.is_help() && self.is_short(&engine.scene, length) {
             return Ok(());
         }
-        plan.before.extend(self.prepare(engine, roma, length, later.is_some())?);
+        plan.before.extend(self.prepare(engine, roma, length)?);
         let trust = match role {
             Role::Sift { most_wrong: Some(most_wrong) } => Some(self.handover(pass).trust(most_wrong)),
             _ => None,
@@ -271,14 +200,14 @@ impl Secondary for Roma {
 
     fn report(&self) -> Vec<(&'static str, Value)> {
         let of = |roma: &RomaSettings| {
-            let RomaSettings { occlusion, shadow, diffuse, bounces, .. } = *roma;
+            let RomaSettings { occlusion, shadow, diffuse, .. } = *roma;
             let [role, shadow_role] = [occlusion, shadow].map(|pass| pass.map(|pass| pass.role));
             let [k, shadow_k, diffuse_k] = [occlusion, shadow, diffuse].map(|pass| pass.map(|pass| pass.grid.k));
             let [steps, shadow_steps, diffuse_steps] =
                 [occlusion, shadow, diffuse].map(|pass| pass.map(|pass| pass.steps));
             let most_wrong =
                 |role| if let Role::Sift { most_wrong: Some(n) } = role { 1e-6 * f64::from(n) } else { 0.0 };
-            let first = occlusion.or(shadow).or(diffuse).or(bounces);
+            let first = occlusion.or(shadow).or(diffuse);
             json!({
                 "bom": self.base.source().name(),
                 "k": k,
@@ -289,8 +218,6 @@ impl Secondary for Roma {
                 "shadow_steps": shadow_steps,
                 "diffuse_k": diffuse_k,
                 "diffuse_steps": diffuse_steps,
-                "bounces_k": bounces.map(|pass| pass.grid.k),
-                "bounces_steps": bounces.map(|pass| pass.steps),
                 "one_in": if let Some(Role::Correct(one_in)) = role { one_in } else { 1 },
                 "most_wrong": role.or(shadow_role).map_or(0.0, most_wrong),
                 "ao_handover": role.map(|role| self.handovers[0].report(role)),

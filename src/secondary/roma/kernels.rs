@@ -4,9 +4,7 @@ use super::cosine::roma_draw;
 use super::maps::RomaMaps;
 use super::twin::{roma_measure, roma_pilots, roma_rotate, roma_trace};
 use crate::kernels;
-use crate::kernels::layout::{
-    HANDOVERS, Level, NONE, ROMA_CORRECT, ROMA_FAR, ROMA_KNOWN, ROMA_SIFT, ROMA_WHOLE, RomaMap, RomaOwn,
-};
+use crate::kernels::layout::{HANDOVERS, Level, NONE, ROMA_CORRECT, ROMA_FAR, ROMA_SIFT, ROMA_WHOLE, RomaMap, RomaOwn};
 use crate::kernels::table::{Family, FamilyBuffer};
 use crate::schedule::{Over, Own, Pass, Report, Step};
 
@@ -16,7 +14,7 @@ kernels! {
 
     roma_rotate: "roma/roma_rotate" Own [] |b, t| roma_rotate(b, t.buffers);
     roma_pilots: "roma/roma_pilots" Own [] |b, t| roma_pilots(b, t.own);
-    roma_trace: "roma/roma_trace" Own [] |b, t| roma_trace(b, t.buffers, t.own, t.seen, &t.pixels.densities);
+    roma_trace: "roma/roma_trace" Own [] |b, t| roma_trace(b, t.buffers, t.own, t.seen);
     roma_draw: "roma/roma_draw" Own [] |b, t| roma_draw(b, t.buffers, t.own, t.seen, (t.pixels, t.shaded));
     roma_measure: "roma/roma_measure" Own [] |b, t| roma_measure(b, t.buffers, t.own, t.seen);
 }
@@ -60,12 +58,6 @@ pub enum RomaPart {
     Correct {
         /// One ray in so many is a pilot.
         one_in: u32,
-    },
-    /// What they know: rays that meet nothing, and wide ones that meet something far enough from their start. The others
-    /// are still to be traced.
-    Known {
-        /// So many cells of the base map that holds the start away, or more.
-        near: u32,
     },
 }
 
@@ -147,24 +139,13 @@ impl RomaMaps {
     /// Answers a part of the pass's rays, and counts them: phase 3. `steps`: columns that a ray passes before it is
     /// finished along the map's direction; 0: it takes that direction from the start.
     pub fn trace(&self, steps: u32, part: RomaPart) -> Step {
-        self.answer(steps, part, false)
-    }
-
-    /// The same of rays by which paths go on: the surfaces that they leave are no longer in the set before.
-    pub fn trace_path(&self, steps: u32, part: RomaPart) -> Step {
-        self.answer(steps, part, true)
-    }
-
-    fn answer(&self, steps: u32, part: RomaPart, is_path: bool) -> Step {
         let (number, Sift { near, pilots }) = match part {
             RomaPart::Whole | RomaPart::Cosine => (ROMA_WHOLE, Sift::default()),
             RomaPart::Far => (ROMA_FAR, Sift::default()),
             RomaPart::Sift(sift) => (ROMA_SIFT, sift),
             RomaPart::Correct { one_in } => (ROMA_CORRECT, Sift { near: None, pilots: one_in }),
-            RomaPart::Known { near } => (ROMA_KNOWN, Sift { near: Some(near), pilots: 0 }),
         };
-        let (near, is_path) = (near.unwrap_or(NONE), is_path.into());
-        let own = RomaOwn { steps, part: number, near, pilots, is_path, ..self.own() };
+        let own = RomaOwn { steps, part: number, near: near.unwrap_or(NONE), pilots, ..self.own() };
         let kernel = if part == RomaPart::Cosine { names::roma_draw } else { names::roma_trace };
         Own::new(kernel, &own).in_phase(2).into()
     }

@@ -128,10 +128,7 @@ pub struct RomaSettings {
     pub shadow: Option<RomaPass>,
     /// Diffuse rays.
     pub diffuse: Option<RomaPass>,
-    /// From the second hit of a path on: rays by which it goes on, and those to the sun and to emitters where
-    /// [`Self::shadow`] has none. Maps answer what they know of these, and the others are traced.
-    pub bounces: Option<RomaPass>,
-    /// What lights the hits of diffuse rays, and of those by which paths go on.
+    /// What lights the hits of diffuse rays.
     pub rsm: RsmSettings,
 }
 
@@ -142,7 +139,6 @@ impl RomaSettings {
             occlusion: self.occlusion.or(other.occlusion),
             shadow: self.shadow.or(other.shadow),
             diffuse: self.diffuse.or(other.diffuse),
-            bounces: self.bounces.or(other.bounces),
             rsm: self.rsm,
         }
     }
@@ -151,8 +147,7 @@ impl RomaSettings {
 /// Most cells of a map on each axis.
 pub const MOST_CELLS: u32 = 256;
 
-/// Cells of bricks than which no ray of use is shorter (spec §2). What a ray of a path meets nearer to its start is not
-/// taken from maps.
+/// Cells of bricks than which no ray of use is shorter (spec §2).
 pub const LEAST_CELLS: f64 = 3.0;
 
 /// Rays around a normal as long as this, in cells that bricks have, draw their map by the cosine. Of shorter ones cells

@@ -33,7 +33,7 @@ settings! {
         k: u32 = 4, "--roma-k N", K, "", Methods, Expert;
         /// With --secondary roma: the same of `shadow`.
         shadow_k: u32 = 8, "--roma-shadow-k N", K, "", Methods, Expert;
-        /// With --secondary roma: the same of `diffuse`, and of `bounces`.
+        /// With --secondary roma: the same of `diffuse`.
         diffuse_k: u32 = 4, "--roma-diffuse-k N", K, "", Methods, Expert;
         /// With --secondary roma: cells of a map on each axis. Of 128, 16 maps take 4 MiB for each of up to six sizes
         /// of cells.
@@ -88,8 +88,6 @@ impl Options {
             occlusion: pass(chosen.ao, self.k, keeps(Unsnapped::Ao), self.one_in, THIN),
             shadow: pass(chosen.shadow, self.shadow_k, keeps(Unsnapped::Shadow), None, CLOSED),
             diffuse: pass(chosen.diffuse, self.diffuse_k, keeps(Unsnapped::Diffuse), None, CLOSED),
-            bounces: pass(chosen.bounces, self.diffuse_k, true, None, CLOSED)
-                .map(|pass| RomaPass { steps: MOST_STEPS, ..pass }),
             rsm,
         }
     }

@@ -5,7 +5,7 @@ use super::directions::stratum_of;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     COUNTER_PILOTS, COUNTER_RAYS_ANSWERED, COUNTER_RAYS_CAPPED, HANDOVERS, Hit, Level, MET, NONE, PARAM_ANY_HIT,
-    Params, ROMA_CORRECT, ROMA_FAR, ROMA_KNOWN, ROMA_SIFT, ROMA_WHOLE, Ray, RomaMap, RomaOwn, Surface, T_INFINITE,
+    Params, ROMA_CORRECT, ROMA_FAR, ROMA_SIFT, ROMA_WHOLE, Ray, RomaMap, RomaOwn, Surface, T_INFINITE,
 };
 use crate::kernels::rays::{RaySet, is_traced};
 use crate::kernels::table::words;
@@ -42,9 +42,6 @@ const LEAST_SPEED: f32 = f32::from_bits((127 - 60) << 23);
 
 /// The golden section of 2³².
 pub(crate) const GOLDEN: u32 = 0x9e37_79b9;
-
-/// Density over solid angles of the directions of wide rays at most: those that are drawn around a normal have 1 / pi.
-const WIDE: f32 = 0.5;
 
 /// Rays that a task traces in a row.
 pub(crate) const RUN: usize = 256;
@@ -461,19 +458,16 @@ pub fn roma_pilots(bound: &Bound, set: &mut RaySet) {
 
 /// Answers the pass's rays by ray-aligned maps. What is met is written as a hit of no triangle, but where rays are
 /// sifted: there, those that meet nothing are ended, and others are traced up to `near` cells from their start.
-/// Where pilots have been traced, these count for what maps get wrong. Of rays of which maps answer what they know, those
-/// that they do not are traced. `densities`: by which the directions of rays of paths were drawn.
+/// Where pilots have been traced, these count for what maps get wrong.
 pub fn roma_trace(
     bound: &Bound,
     buffers: &mut [Vec<u32>],
     set: &mut RaySet,
     seen: &RaySet,
-    densities: &[f32],
 ) -> Result<(), ExecutorError> {
     let (p, own) = (bound.params, bound.own::<RomaOwn>());
     let of = Maps::of(bound, buffers)?;
     let (is_far, is_sifted) = (own.part == ROMA_FAR, own.part == ROMA_SIFT);
-    let is_known = own.part == ROMA_KNOWN;
     let RaySet { rays, hits, surfaces } = set;
     let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
     all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
@@ -491,20 +485,13 @@ pub fn roma_trace(
                 tally.add(COUNTER_RAYS_ANSWERED, u32::from(is_answered && !is_sifted));
                 continue;
             }
-            let normal = if own.is_path == 0 { normal_of(seen, index) } else { surface.normal };
+            let normal = normal_of(seen, index);
             let taken = of.nearest(ray, normal);
             let from = if is_far { hit.t } else { ray.t_min };
-            let found = of.answer(index as u32, ray, &taken, normal, from, is_sifted || is_known);
+            let found = of.answer(index as u32, ray, &taken, normal, from, is_sifted);
             tally.add(COUNTER_RAYS_CAPPED, u32::from(found.is_capped));
             if is_sifted {
                 is_answered = of.sift(index as u32, ray, normal, &found, hit);
-            } else if is_known {
-                let is_wide = own.is_path == 0 || densities[index] <= WIDE;
-                is_answered = of.knows(index as u32, ray, normal, &found, is_wide);
-                if is_answered {
-                    found.write(hit, (!bound.has(PARAM_ANY_HIT)).then_some(surface));
-                    hit.t = ANSWERED;
-                }
             } else if own.part == ROMA_CORRECT && is_pilot(p, own, index as u32) {
                 correct(own, found.met.is_some(), hit);
             } else {
@@ -544,19 +531,6 @@ impl Maps<'_> {
             hit.t = least(ray.t_max, near_end(p, own, self.levels, index, ray, normal, own.near));
         }
         false
-    }
-}
-
-impl Maps<'_> {
-    /// Whether a ray is answered: maps find it free, or it is wide and meets something far enough from its start to be
-    /// known. What is met is known to a cell: too little for rays of a sharp lobe.
-    fn knows(&self, index: u32, ray: &Ray, normal: Vec3, found: &Answer, is_wide: bool) -> bool {
-        match &found.met {
-            None => found.is_known,
-            Some(met) => {
-                is_wide && met.t >= near_end(self.params, self.own, self.levels, index, ray, normal, self.own.near)
-            }
-        }
     }
 }
 

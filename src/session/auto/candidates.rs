@@ -78,7 +78,6 @@ pub fn alone(effect: &str) -> &'static str {
         "ao" => "--effects ao --sun-intensity 0",
         "shadow" => "--effects shadow --sky-intensity 0",
         "diffuse" => "--effects shadow,diffuse --sky-intensity 0",
-        "path" => "--effects path --bounces 4 --diffuse-rays 1 --environment sky",
         _ => "--effects environment --environment sky",
     }
 }

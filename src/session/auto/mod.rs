@@ -209,10 +209,6 @@ impl Auto {
             let found = match &*rates {
                 _ if settings.motion.is_some() => Offers::none("instances move"),
                 _ if settings.lod > 0.0 => Offers::none("rates of levels of detail are not known"),
-                // Rays of an effect from later hits would be answered with those from the first, whatever that saves.
-                _ if renderer.settings.effects.bounces > 1 && own.effect != "ao" => {
-                    Offers::none("rates of paths of several bounces are not known")
-                }
                 None => Offers::none("there are no rates of this device"),
                 Some(Found { rates, .. }) => {
                     let loaded = most(own.effect);

@@ -118,25 +118,6 @@ fn errors_are_those_of_the_pictures() {
 }
 
 #[test]
-fn paths_of_several_bounces_are_traced() {
-    let folder = folder();
-    let scene = city(folder.path(), "20K", "1K");
-    let promised = rates(0.3, 1.0);
-    let method = MethodRate { effect: "diffuse".into(), ..promised.methods[0].clone() };
-    let promised = Rates { exact: [("diffuse".to_owned(), 1e-6)].into(), methods: vec![method], ..Rates::default() };
-    let file = rate_file(&scene, promised);
-    let of = |bounces: u32, options: &str| {
-        let common = "--adapter cpu --size 48x32 --effects shadow,diffuse --frames 64";
-        let options = format!("{common} --bounces {bounces} --error 1 --rates {} {options}", file.display());
-        let mut session = Session::open(&scene, &settings(&options)).expect("a session");
-        frame(&mut session, 1)
-    };
-    assert!(of(2, "--secondary auto") == of(2, ""));
-    // Control: of one bounce the same method is taken.
-    assert!(of(1, "--secondary auto") != of(1, ""));
-}
-
-#[test]
 fn without_rates_all_is_traced_and_said_so() {
     let folder = folder();
     let scene = city(folder.path(), "20K", "1K");

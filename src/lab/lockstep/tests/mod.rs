@@ -159,8 +159,8 @@ fn effects() -> Effects {
     }
 }
 
-/// An environment, and emitters of every kind around `top`; of areas none where they are not to be.
-fn lamps(scene: &SceneFile, top: DVec3, has_areas: bool) -> Lamps {
+/// An environment, and emitters of every kind around `top`.
+fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
     let image = Equirectangular::of(24, 12, |[x, y, z]| [1.2 + x, 1.1 + y, 1.5 + x * z]);
     let rectangle = Shape::Parallelogram { corner: top, edges: [DVec3::X * 3.0, DVec3::Z * 3.0] };
     let down = DVec3::new(0.1, -1.0, 0.2).normalize();
@@ -175,8 +175,6 @@ fn lamps(scene: &SceneFile, top: DVec3, has_areas: bool) -> Lamps {
     let mut emitters: Vec<Emitter> = shapes.map(|shape| Emitter { shape, two_sided: false, radiance }).into();
     let surfaces = emissive_triangles(scene, 1 << 20).unwrap().unwrap().emitters(scene.resident());
     emitters.extend(surfaces.iter().enumerate().map(|(i, e)| Emitter { two_sided: i % 2 == 0, ..*e }));
-    let is_area = |shape: &Shape| matches!(shape, Shape::Parallelogram { .. } | Shape::Triangle { .. });
-    emitters.retain(|e| has_areas || !is_area(&e.shape));
     Lamps::new(Some(environment(image, 1.0, 40.0).0), emitters, 10.0)
 }
 
@@ -184,8 +182,7 @@ fn lamps(scene: &SceneFile, top: DVec3, has_areas: bool) -> Lamps {
 fn roma((steps, role): (u32, Role)) -> RomaSettings {
     let pass = |k| RomaPass { grid: Grid { k, size: 32, samples: 4 }, steps, role };
     let diffuse = (!role.is_help()).then(|| RomaPass { role: Role::Answer, ..pass(4) });
-    let (shadow, rsm) = (Some(pass(8)), RsmSettings { size: 48, lamps: 8 });
-    RomaSettings { occlusion: Some(pass(4)), shadow, diffuse, bounces: None, rsm }
+    RomaSettings { occlusion: Some(pass(4)), shadow: Some(pass(8)), diffuse, rsm: RsmSettings { size: 48, lamps: 8 } }
 }
 
 /// Small fields.
@@ -281,8 +278,7 @@ fn render(
     let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
     let manifest = &scene.resident().manifest;
     let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
-    // Maps know what lamps with maps light.
-    light.lamps = Arc::new(lamps(scene, top, !(variant.roma.is_some() && variant.bounces > 1)));
+    light.lamps = Arc::new(lamps(scene, top));
     let engine = Engine {
         scene: scene.clone(),
         executor: Box::new(executor),
@@ -325,9 +321,6 @@ fn render(
     let methods = methods(&usual, engine.scene.resident());
     let mut renderer = Renderer { engine, methods };
     if let Some(settings) = variant.roma.map(roma) {
-        let (bounces, diffuse) = (settings.occlusion, settings.diffuse);
-        let later = RomaSettings { bounces, shadow: None, diffuse: None, ..settings };
-        let settings = if variant.bounces > 1 { later } else { RomaSettings { diffuse, ..settings } };
         renderer.methods.set(Roma::new(settings, Source::default()));
     }
     if let Some(settings) = variant.field.map(field) {
@@ -429,10 +422,6 @@ fn twins_agree_with_their_kernels() {
         Variant { roma: Some((64, Role::Sift { most_wrong: Some(1000) })), ..VARIANT },
         Variant { roma: Some((0, Role::Correct(4))), ..VARIANT },
         Variant { roma: Some((3, Role::Correct(2))), schedule: Schedule::Demand, ..VARIANT },
-        // From the second hit of paths on.
-        Variant { roma: Some((64, Role::Answer)), bounces: 3, ..VARIANT },
-        Variant { roma: Some((3, Role::Answer)), bounces: 2, schedule: Schedule::Demand, ..VARIANT },
-        Variant { roma: Some((64, Role::Sift { most_wrong: Some(100_000) })), bounces: 4, ..VARIANT },
         Variant { field: Some(64), ..VARIANT },
         Variant { field: Some(3), ..VARIANT },
         Variant { dvf: Some(visibility(8)), ..VARIANT },
@@ -454,7 +443,6 @@ fn twins_agree_with_their_kernels() {
         asked(Against::Absent, Interpolation::Both, 1 << 30),
         Variant { schedule: Schedule::Demand, ..asked(Against::All, Interpolation::Positions, 40_000) },
         Variant { everything_fits: true, ..asked(Against::All, Interpolation::Directions, 1 << 30) },
-        Variant { bounces: 3, ..asked(Against::All, Interpolation::None, 1 << 30) },
     ];
     let selecting = |pixels, blend| Variant { lod: Lod { pixels, blend, ..Lod::default() }, ..VARIANT };
     let by_levels = [
@@ -629,37 +617,6 @@ fn rays_are_sifted_by_maps_alone() {
         let steps = [Step::StartHits, maps.rotate(), maps.trace(8, RomaPart::Sift(Sift::default()))];
         let answered = executor.run(pass, &steps, &cache.states).unwrap().counters.rays_answered;
         assert_eq!(answered > 0, levels > 0, "{answered} of nothing but free rays");
-        assert_eq!(findings.lock().unwrap().differences, Vec::<String>::new());
-    }
-}
-
-/// Rays of paths, and of those to lamps, are answered where they are free or meet something far enough away.
-#[test]
-fn what_maps_know_is_that_of_their_twins() {
-    let Some(device) = device() else { return };
-    let (scene, pages, cache) = given(&device);
-    let roma = RomaPass { grid: Grid { k: 4, size: 32, samples: 1 }, steps: 64, role: Role::Answer };
-    let boms = base_maps(32, Some(200));
-    for pass in [Pass::Path(2), Pass::Shadow(Lamp::Sun)] {
-        let findings = Arc::new(Mutex::new(Findings::default()));
-        let mut executor = lockstep(&device, &scene, &pages, &VARIANT, &findings);
-        executor.allow_bounces();
-        executor.begin_frame(&View { frame: FRAME, params: Params::default(), directions: Directions::default() });
-        let maps = RomaMaps::new(&boms, 2, &FRAME, roma, (0, 0));
-        maps.give(&mut executor, &boms).unwrap();
-        executor.set_rays(pass, &rays(32));
-        let mut answered = |near: u32| {
-            let part = RomaPart::Known { near };
-            let trace = if pass.is_any_hit() { maps.trace(64, part) } else { maps.trace_path(64, part) };
-            let report = executor.run(pass, &[Step::StartHits, maps.rotate(), trace], &cache.states).unwrap();
-            let hits = executor.read_hits(pass).unwrap();
-            let [met, free] =
-                [MET, NONE].map(|id| hits.iter().filter(|hit| hit.id == id && hit.t == -1.0).count() as u64);
-            assert_eq!(report.counters.rays_answered, met + free, "{pass:?}");
-            [met, free]
-        };
-        let ([all, free], [some, others]) = (answered(0), answered(8));
-        assert!(free > 20 && others == free && some > 20 && some < all, "{pass:?}: {all} {some} {free}");
         assert_eq!(findings.lock().unwrap().differences, Vec::<String>::new());
     }
 }
