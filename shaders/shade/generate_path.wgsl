@@ -1,8 +1,8 @@
 // One ray from every hit of the shaded set, which a path goes on by, in a direction drawn by what the surface reflects:
 // around the normal by its diffuse part, else by its gloss, which may lead through it. The throughput is what was
 // carried so far times what is reflected, and the density by which the direction was drawn is noted. From the third ray
-// on, paths that lose light end by chance, and what goes on makes up for them (Russian roulette: Arvo, Kirk 1990). Where
-// paths end at these hits, those alone go on that lead through them. Then this set is moved to that before it.
+// on, paths that lose light end by chance, and what goes on makes up for them (Russian roulette: Arvo, Kirk 1990).
+// Where paths end at these hits, those alone go on that lead through them. Then this set is moved to that before it.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"

@@ -5,8 +5,8 @@
 pub enum Step {
     /// Fill the pass's rays from the camera, or from the hits of the set before.
     Generate,
-    /// Fill the rays of set 1 by which paths go on from its hits, each path's of this number; run as a pass of set 2. As
-    /// one of [`Pass::BounceShadow`](super::Pass), by facets that refract alone.
+    /// Fill the rays of set 1 by which paths go on from its hits, each path's of this number; run as a pass of set 2.
+    /// As one of [`Pass::BounceShadow`](super::Pass), by facets that refract alone.
     Continue(u32),
     /// Start the hits of rays given from outside.
     StartHits,

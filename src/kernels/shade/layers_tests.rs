@@ -387,8 +387,8 @@ fn directions_are_drawn_by_their_density() {
     }
 }
 
-/// Facets that refract under a film, anisotropic ones too: what they reflect and let pass comes to no more than all, and
-/// where they are smooth to all of it.
+/// Facets that refract under a film, anisotropic ones too: what they reflect and let pass comes to no more than all,
+/// and where they are smooth to all of it.
 #[test]
 fn facets_that_refract_gain_nothing() {
     let body = Material { transmission: 1.0, flags: MATERIAL_REFRACTS, ..plastic() };

@@ -1,6 +1,6 @@
 //! Materials and their textures (glTF 2.0, sections 3.8 and 3.9, and the extensions KHR_materials_anisotropy,
-//! _clearcoat, _emissive_strength, _ior, _iridescence, _pbrSpecularGlossiness, _sheen, _specular, _transmission, _unlit,
-//! _volume and KHR_texture_transform).
+//! _clearcoat, _emissive_strength, _ior, _iridescence, _pbrSpecularGlossiness, _sheen, _specular, _transmission,
+//! _unlit, _volume and KHR_texture_transform).
 //!
 //! Filters of samplers are not kept: textures are averaged over what a pixel covers, whatever the sampler asks for.
 
