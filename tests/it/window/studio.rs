@@ -114,7 +114,7 @@ fn a_camera_at_rest_shows_what_walk_writes() {
             if number > 0 && !is_quick {
                 continue;
             }
-            let mut asked = settings(options);
+            let mut asked = settings(options).for_windows();
             asked.set("adapter", &adapter).expect("an adapter");
             asked.path = Some(path.clone());
             let (studio, opened) = open(&scene, &asked);
