@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 /// Nothing here takes longer.
 const MOST: Duration = Duration::from_secs(120);
 
-/// Settings of these options.
+/// Settings of these options, as the command takes them.
 pub fn settings(options: &str) -> Settings {
-    Settings::from_options(options).expect("options")
+    Settings::from_options(options).expect("options").for_windows()
 }
 
 /// A studio, and the scene that it has opened.
@@ -114,7 +114,7 @@ fn a_camera_at_rest_shows_what_walk_writes() {
             if number > 0 && !is_quick {
                 continue;
             }
-            let mut asked = settings(options).for_windows();
+            let mut asked = settings(options);
             asked.set("adapter", &adapter).expect("an adapter");
             asked.path = Some(path.clone());
             let (studio, opened) = open(&scene, &asked);
