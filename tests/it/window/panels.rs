@@ -36,7 +36,7 @@ fn window(scene: &Path, options: &str, folder: &Path) -> Harness<'static, Window
 
 /// The same, where models are converted so.
 fn opened(scene: &Path, options: &str, folder: &Path, converter: Converter) -> Harness<'static, Window> {
-    let settings = Settings::from_options(&format!("--adapter cpu {options}")).expect("options");
+    let settings = Settings::from_options(&format!("--adapter cpu {options}")).expect("options").for_windows();
     let mut viewer = Viewer::new(&settings, Pace::default(), converter, Arc::new(|| ())).expect("a viewer");
     viewer.open(scene);
     let desk = Desk::new(viewer, Recent::default(), folder.into());
