@@ -149,10 +149,10 @@ pub struct DemoArgs {
     #[arg(long, value_name = "COUNT", default_value = "2M", value_parser = positive_count)]
     pub triangles: u64,
     /// Frames of the walk
-    #[arg(long, value_name = "N", default_value = "6", value_parser = ranged::<1, 1_000_000>)]
+    #[arg(long, value_name = "N", default_value = "5", value_parser = ranged::<1, 1_000_000>)]
     pub frames: u32,
     /// Width and height of the frames in pixels, each 1 to 16384
-    #[arg(long, value_name = "WxH", default_value = "640x360")]
+    #[arg(long, value_name = "WxH", default_value = "480x270")]
     pub size: ImageSize,
     /// Device memory for bricks: a size, or a share P% of all bricks; what the path shows takes more than the default
     #[arg(long, value_name = "SIZE|P%", default_value = "20%")]
