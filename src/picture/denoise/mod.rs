@@ -7,7 +7,7 @@
 //! "ReBLUR", Ray Tracing Gems II, chapter 49).
 //!
 //! *What is changed.* The light of sun and emitters and what the other effects add are two layers, each with a history
-//! of its own ([`Layer`]): edges of shadows, which have little noise, are not mixed with the noise of occlusion, of an
+//! of its own: edges of shadows, which have little noise, are not mixed with the noise of occlusion, of an
 //! environment and of bounces. Distances and variances of light are those of all channels, not of luminance, by which
 //! directions to an environment are drawn. The variance is Welford's, weighted (West 1979), and it is that of the mean,
 //! which falls as samples come in, so that the filter narrows. The long average gives way to the short one as far as
@@ -20,7 +20,7 @@
 //!
 //! *Practice.* Every step of the filter is a kernel with a twin ([`crate::kernels::denoise`]): the executor that
 //! rendered a frame filters it, and both executors give the same bits. Guides are read back and given to it again, in
-//! f32 relative to the camera ([`given`]); where surfaces were before is found on the host in f64 ([`reproject`]).
+//! f32 relative to the camera (`given`); where surfaces were before is found on the host in f64 (`reproject`).
 //! Around the filter go the sky, emission, and light on albedos below [`LEAST_ALBEDO`], black among them. What is not
 //! finite never enters a history and is counted. `--taa` ([`Taa`]) averages frames whose samples lie at different
 //! points of the pixels, after or without denoising.

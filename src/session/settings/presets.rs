@@ -65,14 +65,14 @@ const OWN: [&str; 7] = ["spp", "noise", "denoise", "taa", "lod_correct", "frame_
 const MOST_PIXELS: u64 = 1 << 23;
 
 impl Settings {
-    /// These settings with `draft` in the place of [`Quality::Auto`], so that options that are told stand for what is
+    /// These settings with `draft` in the place of `auto`, so that options that are told stand for what is
     /// shown.
     pub fn for_windows(&self) -> Self {
         let quality = if self.quality == Quality::Auto { Quality::Draft } else { self.quality };
         Self { quality, ..self.clone() }
     }
 
-    /// These settings with a preset in the place of [`Quality::Auto`]: `preview`, or `draft` where single settings
+    /// These settings with a preset in the place of `auto`: `preview`, or `draft` where single settings
     /// choose effects, samples, methods or measurements, and where a picture has more than 8,388,608 pixels.
     pub fn for_pictures(&self) -> Self {
         let mut settled = self.clone();
