@@ -119,8 +119,8 @@ settings! {
         /// denoised. `exact`: one camera ray and one shadow ray a pixel, without exposure and tone map, for
         /// measurements. `auto`: `preview` for `walk` and `demo`; `draft` for the others, where options choose effects,
         /// samples, methods or measurements, and for pictures of more than 8 million pixels. On two cores a frame of
-        /// 1280x720 of a city takes 7 s, 20 s, 90 s and 1 s, one of Sponza 18 s, 75 s, 5 min and 4 s. Hits are exact with
-        /// all of them.
+        /// 1280x720 of a city takes 7 s, 20 s, 90 s and 1 s, one of Sponza 18 s, 75 s, 5 min and 4 s. Hits are exact
+        /// with all of them.
         quality: Quality = Quality::Auto, "--quality NAME", Rule::Any, "", Quality, Common;
         /// Samples per pixel. Beyond 64 they are summed in f64.
         spp: u32 = 4, "--spp N", Rule::Whole(1, 1_000_000), "", Quality, Common;
