@@ -2,10 +2,10 @@
 """Renders Sponza from five viewpoints under the sun, a physical sky and each HDR environment, on one sheet.
 
     pip install pillow
-    tools/contact_sheet.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR [--spp 64]
+    tools/contact_sheet.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR [--spp 16]
 
 Rows are lights, columns the views of paths/sponza_1.json to sponza_5.json. Every picture is kept in DIR and not made
-twice; the sheet is DIR/sheet.jpg. Every picture is exposed by itself; with `--denoise` pictures are filtered.
+twice; the sheet is DIR/sheet.jpg. Every picture is exposed by itself, has all light with eight bounces, and is denoised.
 """
 
 import argparse
@@ -15,7 +15,6 @@ import subprocess
 from PIL import Image, ImageDraw
 
 VIEWS = range(1, 6)
-EFFECTS = "shadow,environment,diffuse,glossy"
 
 
 def lights(scenes):
@@ -33,8 +32,7 @@ def render(args, scene, name, options, view):
     picture = folder / "frames" / "0000.png"
     if not picture.exists():
         command = [args.brickwalk, "walk", scene, "-o", folder, "--path", f"paths/sponza_{view}.json", "--frames", "1"]
-        command += ["--size", args.size, "--effects", EFFECTS, "--diffuse-rays", "8"]
-        command += ["--spp", str(args.spp), *options] + (["--denoise"] if args.denoise else [])
+        command += ["--size", args.size, "--quality", "high", "--spp", str(args.spp), "--quiet", *options]
         subprocess.run([str(word) for word in command], check=True)
     return picture
 
@@ -46,9 +44,8 @@ def main():
         "--brickwalk", type=pathlib.Path, default="target/release/brickwalk", help="the program (default: %(default)s)"
     )
     parser.add_argument("-o", "--output", type=pathlib.Path, required=True, help="folder of all pictures")
-    parser.add_argument("--spp", type=int, default=64, help="samples a pixel (default: %(default)s)")
+    parser.add_argument("--spp", type=int, default=16, help="samples a pixel (default: %(default)s)")
     parser.add_argument("--size", default="320x180", help="pixels of a picture (default: %(default)s)")
-    parser.add_argument("--denoise", action="store_true", help="filter the pictures")
     args = parser.parse_args()
     args.output.mkdir(parents=True, exist_ok=True)
     scene = args.output / "sponza.bricks"

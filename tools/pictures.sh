@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Makes the pictures of docs/: generates a city, a plant, woods and a stadium, renders each with `--quality high`, beside
-# Sponza where its folder is given, and puts them on one sheet. Half an hour on two cores. Pictures that are there are
-# not made twice.
+# Sponza where its folder is given, and puts them on one sheet. Half an hour on two cores, and an hour with SCENES.
+# Pictures that are there are not made twice.
 #
 #   tools/pictures.sh DIR [SCENES]
 #
-# DIR keeps scenes and pictures; SCENES is a folder with sponza/Sponza.gltf. The sheet is DIR/pictures.jpg. It needs
-# python3 with pillow.
+# DIR keeps scenes and pictures. It gets pictures.jpg, and window.jpg where there are Xvfb, openbox and import.
+# SCENES is a folder with sponza/Sponza.gltf and env/, for sponza.jpg, Sponza under six lights, and study.jpg, plots of
+# a study of it, which take chromium. It needs python3 with pillow.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
@@ -42,6 +43,43 @@ picture stadium "$out/stadium.bricks" "$out/stadium.near.json" --sun 0.5,0.45,0.
 if [ $# -ge 2 ]; then
     [ -e "$out/sponza.bricks" ] || "$brickwalk" convert "$2/sponza/Sponza.gltf" --quiet -o "$out/sponza.bricks"
     picture sponza "$out/sponza.bricks" "$root/paths/sponza_3.json" --sun 0.3,1,0.06
+fi
+
+# The window over the city, once it rests.
+window() {
+    local display=:97 server view
+    Xvfb $display -screen 0 1280x800x24 2>/dev/null &
+    server=$!
+    sleep 2
+    DISPLAY=$display openbox 2>/dev/null &
+    DISPLAY=$display "$brickwalk" view "$out/city.bricks" -o "$out" --path "$root/docs/city.json" \
+        --size 1280x775 --quiet --sun 0.7,0.5,0.5 --spp 16 --effects shadow,ao &
+    view=$!
+    sleep "${WINDOW_SECONDS:-150}"
+    DISPLAY=$display import -window root "$out/window.png"
+    kill "$view" "$server"
+    wait "$view" "$server" 2>/dev/null || true
+    python3 -c 'import sys; from PIL import Image; Image.open(sys.argv[1]).convert("RGB").save(sys.argv[2], quality=88)' \
+        "$out/window.png" "$out/window.jpg"
+}
+
+has() { command -v "$1" >/dev/null; }
+if [ ! -e "$out/window.jpg" ] && has Xvfb && has openbox && has import; then
+    echo "window"
+    window
+fi
+if [ $# -ge 2 ]; then
+    lights=$out/lights
+    mkdir -p "$lights"
+    [ -e "$lights/sponza.bricks" ] || ln -s "$out/sponza.bricks" "$lights/sponza.bricks"
+    python3 "$root/tools/contact_sheet.py" --scenes "$2" --brickwalk "$brickwalk" -o "$lights"
+    cp "$lights/sheet.jpg" "$out/sponza.jpg"
+    if has chromium; then
+        "$brickwalk" study "$out/sponza.bricks" -o "$out/study" --path "$root/paths/sponza.json" \
+            --effects ao,diffuse --caches 100% --budget 20 --quiet
+        python3 "$root/tools/study_picture.py" "$out/study/report.html" -o "$out/study.jpg" \
+            "FLIP over time: ao, cache 100 %, warm" "FLIP over time: diffuse, cache 100 %, warm"
+    fi
 fi
 
 python3 - "$out" <<'SHEET'
