@@ -1,12 +1,17 @@
-//! What some materials have besides: sheen, anisotropy and a thin film. It is packed into words of a material that are
-//! zero in all others.
+//! What some materials have besides: sheen, anisotropy and a thin film, packed into words of a material that are zero
+//! in all others; and further textures, which the record behind it holds.
 
-use crate::records::{MATERIAL_TEXTURES, Material};
+use crate::records::{MATERIAL_TEXTURES, Material, NONE};
 
 /// [`Material::flags`]: it has [`Layers`].
 pub const MATERIAL_LAYERS: u32 = 32;
 /// [`Material::flags`]: its [`Layers`] have a direction, so that its triangles want tangents.
 pub const MATERIAL_ANISOTROPIC: u32 = 64;
+/// [`Material::flags`]: the next record holds further textures of it, as [`Material::further`] says. Its clear coat has
+/// a normal of its own.
+pub const MATERIAL_MORE: u32 = 128;
+/// [`Material::flags`]: it is such a record, and no material by itself.
+pub const MATERIAL_FURTHER: u32 = 256;
 
 /// Steps of a packed share, from 0 to 1.
 pub const LAYER_STEPS: u32 = 4095;
@@ -31,8 +36,11 @@ pub struct Layers {
     pub film: f32,
     /// Index of refraction of the film, 1 to below 5.
     pub film_index: f32,
-    /// Thickness of the film, nm, 0..=4095. No colours are left of thicker ones.
+    /// Thickness of the film, nm, 0..=4095; its greatest where a texture says how thick it is. No colours are left of
+    /// thicker ones.
     pub film_thickness: f32,
+    /// Its least where a texture says so, nm, 0..=4095.
+    pub film_least: f32,
 }
 
 impl Layers {
@@ -45,6 +53,7 @@ impl Layers {
         film: 0.0,
         film_index: 1.0,
         film_thickness: 0.0,
+        film_least: 0.0,
     };
 
     /// Ten numbers of 12 bits in five words.
@@ -59,7 +68,7 @@ impl Layers {
             [blue, share(self.sheen_roughness)],
             [share(self.anisotropy), turns],
             [share(self.film), index],
-            [number(self.film_thickness), 0],
+            [number(self.film_thickness), number(self.film_least)],
         ]
         .map(|[low, high]| low | high << LAYER_BITS)
     }
@@ -67,7 +76,7 @@ impl Layers {
     fn unpack(words: [u32; MATERIAL_TEXTURES]) -> Self {
         let halves = words.map(|word| [word & LAYER_STEPS, word >> LAYER_BITS].map(|x| x as f32));
         let share = |x: f32| x * (1.0 / LAYER_STEPS as f32);
-        let [[red, green], [blue, roughness], [anisotropy, turns], [film, index], [thickness, _]] = halves;
+        let [[red, green], [blue, roughness], [anisotropy, turns], [film, index], [thickness, least]] = halves;
         Self {
             sheen: [red, green, blue].map(share),
             sheen_roughness: share(roughness),
@@ -76,6 +85,7 @@ impl Layers {
             film: share(film),
             film_index: 1.0 + index * (1.0 / LAYER_INDEX_STEPS as f32),
             film_thickness: thickness,
+            film_least: least,
         }
     }
 }
@@ -117,7 +127,31 @@ impl Material {
         words.iter().all(|word| *word >= 0.0 && *word < most && word.fract() == 0.0)
             && again.flags & kept == self.flags & kept
             && (self.flags & MATERIAL_LAYERS != 0 || words == [0.0; MATERIAL_TEXTURES])
-            && words[4] <= LAYER_STEPS as f32
+    }
+
+    /// What follows a material with [`MATERIAL_MORE`]: five textures, with their places and sets of coordinates as
+    /// those of any material. They multiply its factors:
+    ///
+    /// | place | texture |
+    /// | --- | --- |
+    /// | base colour | sRGB: what the dielectric part reflects; alpha: its weight (KHR_materials_specular) |
+    /// | normal | linear: of the clear coat; without one it has that of the surface before its normal texture |
+    /// | metallic-roughness | linear: clear coat, its roughness, share of the film, its thickness |
+    /// | occlusion | linear: direction of the anisotropy, 2 rg - 1, and its strength |
+    /// | emissive | sRGB: sheen; alpha: its roughness |
+    ///
+    /// The film is as thick as [`Layers::film_least`] where the texture has 0, and [`Layers::film_thickness`] where it
+    /// has 1.
+    pub const fn further() -> Self {
+        Self { flags: MATERIAL_FURTHER, ..Self::DIFFUSE }
+    }
+
+    /// Whether it is [`Self::further`] but for textures and the scale of normals.
+    pub(crate) fn is_sound_further(&self) -> bool {
+        let mut bare = *self;
+        bare.textures_mut().into_iter().for_each(|texture| *texture = NONE);
+        let (normal_scale, uv_sets, uv_from_set) = (self.normal_scale, self.uv_sets, self.uv_from_set);
+        bare == Self { normal_scale, uv_sets, uv_from_set, ..Self::further() }
     }
 }
 
@@ -135,6 +169,7 @@ mod tests {
             film: 1.0,
             film_index: 1.3,
             film_thickness: 400.4,
+            film_least: 100.0,
         };
         let mut material = Material::DIFFUSE;
         material.set_layers(&layers);

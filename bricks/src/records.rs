@@ -3,7 +3,7 @@
 //! Every record is `#[repr(C)]`, little-endian, without implicit padding and valid for every bit pattern; what its
 //! values must satisfy is checked by [`crate::validate`] before anything indexes with them.
 
-use crate::layers::{MATERIAL_ANISOTROPIC, MATERIAL_LAYERS};
+use crate::layers::{MATERIAL_ANISOTROPIC, MATERIAL_LAYERS, MATERIAL_MORE};
 use bytemuck::{Pod, Zeroable};
 
 /// "No such thing", in every index field that may be absent.
@@ -406,7 +406,8 @@ impl Material {
 
     /// Whether its triangles need [`AttributeDetail`]s.
     pub fn needs_details(&self) -> bool {
-        self.normal_texture != NONE || self.uv_sets != 0 || self.flags & MATERIAL_ANISOTROPIC != 0
+        let wants_tangents = MATERIAL_ANISOTROPIC | MATERIAL_MORE;
+        self.normal_texture != NONE || self.uv_sets != 0 || self.flags & wants_tangents != 0
     }
 }
 

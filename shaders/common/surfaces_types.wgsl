@@ -73,11 +73,28 @@ struct GBuffer {          // what shading reads of a primary hit
     padding1: u32,
 }
 
+struct More {             // what the further textures of a hit's material show, and its coat's normal
+    specular: vec3<f32>,  // by which what the dielectric part reflects is multiplied
+    specular_weight: f32, // and its weight
+    sheen: vec3<f32>,     // by which the sheen is multiplied
+    sheen_roughness: f32, // and its roughness
+    normal: vec3<f32>,    // of the clear coat, unit, world space
+    coat: f32,            // by which the share of the coat is multiplied
+    along: vec2<f32>,     // direction of the anisotropy from the tangent, any length
+    anisotropy: f32,      // by which its strength is multiplied
+    coat_roughness: f32,  // by which the roughness of the coat is multiplied
+    film: f32,            // by which the share of the film is multiplied
+    film_thickness: f32,  // from its least, 0, to its greatest, 1
+    state: u32,           // bits of GBUFFER_WAITS
+    padding0: u32,
+}
+
 const MATERIAL_DOUBLE_SIDED: u32 = 4u; // both sides are drawn
 const MATERIAL_UNLIT: u32 = 8u;    // it shows its base colour, whatever the light
 const MATERIAL_REFRACTS: u32 = 16u; // the surface of a body that bends light, with PARAM_REFRACT; else thin walls
 const MATERIAL_LAYERS: u32 = 32u;  // it has sheen, anisotropy or a thin film
 const MATERIAL_ANISOTROPIC: u32 = 64u; // its reflection has a direction along the surface
+const MATERIAL_MORE: u32 = 128u;   // the next material holds further textures of it; its coat has a normal of its own
 const GBUFFER_READ: u32 = 1u;      // attributes are read
 const GBUFFER_WAITS: u32 = 62u;    // bits of textures that have still to be looked up, the first is that of texture 0
 const GBUFFER_COARSER: u32 = 64u;  // a coarser level of a texture was looked up

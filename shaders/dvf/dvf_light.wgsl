@@ -32,5 +32,5 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     if !is_occluded_cell {
         light = ambient(g.normal) - light;
     }
-    add_light(index, gloss_of(g, -seen_rays[index].direction).diffuse * light);
+    add_light(index, gloss_of(g, index, -seen_rays[index].direction).diffuse * light);
 }

@@ -38,7 +38,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
         let n = surface.normal;
         let facing = barrier(barrier(barrier(n.x * to_lamp.x) + barrier(n.y * to_lamp.y)) + barrier(n.z * to_lamp.z));
-        texel = RsmTexel(gloss_of(g, to_lamp).diffuse * light, seen_hits[index].t, n, facing);
+        texel = RsmTexel(gloss_of(g, index, to_lamp).diffuse * light, seen_hits[index].t, n, facing);
     }
     rsm_texels[map.first + y * map.width + x] = texel;
 }

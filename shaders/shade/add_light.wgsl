@@ -46,7 +46,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             density = sun_density(d);
         }
     }
-    let s = gloss_of(g, -seen_rays[index].direction);
+    let s = gloss_of(g, index, -seen_rays[index].direction);
     var reflects = s.diffuse;
     if (params.flags & (PARAM_ENVIRONMENT | PARAM_BOUNCE)) == PARAM_ENVIRONMENT && params.diffuse_count > 0.0 {
         reflects *= outweighs(density, params.diffuse_count * max(dot(g.normal, d), 0.0) / PI);

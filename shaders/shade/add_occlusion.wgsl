@@ -19,6 +19,6 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let g = gbuffer[index];
-    let s = gloss_of(g, -seen_rays[index].direction);
+    let s = gloss_of(g, index, -seen_rays[index].direction);
     add_light(index, weight_of(index) * params.share * (s.diffuse * ambient(g.normal) + reflected_ambient(s)));
 }

@@ -46,7 +46,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             ray.t_min = 0.0;
             ray.t_max = select(T_INFINITE, params.length, LIMITED);
             if !LIMITED {
-                carried = params.share * reflected_by_diffuse_rays(gloss_of(g, -seen_rays[index].direction));
+                carried = params.share * reflected_by_diffuse_rays(gloss_of(g, index, -seen_rays[index].direction));
             }
         }
     }

@@ -24,7 +24,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var alpha = 0.0;
     if surface.leaf != NONE {
         let g = gbuffer[index];
-        let s = gloss_of(g, -seen_rays[index].direction);
+        let s = gloss_of(g, index, -seen_rays[index].direction);
         if is_glossy(s) {
             let drawn = gloss_direction(s, points4(pixel_of(index), params.stream, params.seed));
             let is_through = drawn.w > 0.0;

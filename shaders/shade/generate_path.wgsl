@@ -33,7 +33,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var alpha = 0.0;
     if surface.leaf != NONE && max(before.x, max(before.y, before.z)) > 0.0 {
         let g = gbuffer[index];
-        let s = gloss_of(g, -seen_rays[index].direction);
+        let s = gloss_of(g, index, -seen_rays[index].direction);
         let words = points4(pixel_of(index) ^ pcg(u32(before.w) + 1u), params.stream, params.seed);
         let drawn = path_direction(s, g.normal, words);
         let is_through = drawn.w > 0.0;

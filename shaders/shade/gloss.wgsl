@@ -4,6 +4,8 @@
 // KHR_materials_specular), so that no energy is gained. Facets of bodies that refract let pass what they do not reflect
 // (Walter, Marschner, Li, Torrance 2007); the light of further bounces between them is lost. Sheen, anisotropy and thin
 // films are in shade/layers.wgsl. Twin: src/kernels/shade/gloss.rs.
+#include "shade/material.wgsl"
+#include "shade/more.wgsl"
 #include "shade/layers.wgsl"
 
 // Of a lobe's square root of roughness; smoother ones are as sharp as this.
@@ -30,6 +32,12 @@ struct Gloss {
     eta: f32,             // index of refraction on the side of the view over that beyond; 0 where nothing refracts
 }
 
+// The side of a lobe that is seen.
+struct Frame {
+    normal: vec3<f32>,
+    cos_view: f32,
+}
+
 const LEAST_COS_VIEW: f32 = 1.0e-4;
 
 // What a lobe with reflectances of (1, 0) and of (0, 1) along the normal and at grazing angles reflects of light from
@@ -52,8 +60,8 @@ fn table_at(first: u32, cosine: f32, alpha: f32) -> vec2<f32> {
     return mix(low, high, y - f32(row));
 }
 
-// Of a hit seen along -view, of any length.
-fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
+// Of hit `index` of the set, seen along -view, of any length.
+fn gloss_of(g: GBuffer, index: u32, view: vec3<f32>) -> Gloss {
     let m = materials[g.material];
     var s: Gloss;
     s.diffuse = g.albedo;
@@ -66,11 +74,13 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
     s.view = normalize(view);
     s.cos_view = max(dot(s.normal, s.view), LEAST_COS_VIEW);
     s.alpha = max(g.roughness * g.roughness, LEAST_ALPHA);
-    lay(&s, g, m);
+    let x = more_of(g, index);
+    lay(&s, g, m, x);
     let around = facets_around(s);
     let white = around.x + around.y;
     var bounces = (1.0 - white) / white;
-    var specular = m.specular;
+    var specular = m.specular * (x.specular * x.specular_weight);
+    let specular_weight = m.specular_weight * x.specular_weight;
     var inside = 0.0;
     if (m.flags & MATERIAL_REFRACTS) != 0u {
         if (g.state & GBUFFER_REFRACTS) != 0u {
@@ -87,18 +97,19 @@ fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
     let of_dielectric = vec3<f32>(1.0) + specular * bounces;
     let of_metal = vec3<f32>(1.0) + g.albedo * bounces;
     s.f0 = mix(specular * of_dielectric, g.albedo * of_metal, g.metallic);
-    s.f90 = mix(m.specular_weight * of_dielectric, of_metal, g.metallic);
+    s.f90 = mix(specular_weight * of_dielectric, of_metal, g.metallic);
     s.share = s.f0 * around.x + s.f90 * around.y;
-    var left = vec3<f32>(1.0) - (specular * around.x + vec3<f32>(m.specular_weight * around.y)) * of_dielectric;
+    var left = vec3<f32>(1.0) - (specular * around.x + vec3<f32>(specular_weight * around.y)) * of_dielectric;
     lay_film(&s, &left, specular, g, white, bounces);
     let below_facets = g.albedo * (1.0 - g.metallic);
     s.diffuse = below_facets * (1.0 - inside) * max(left, vec3<f32>(0.0));
     s.through = below_facets * inside;
-    s.coat = m.clearcoat;
+    s.coat = m.clearcoat * x.coat;
     s.under = 1.0;
     if s.coat > 0.0 {
-        s.coat_alpha = max(m.clearcoat_roughness * m.clearcoat_roughness, LEAST_ALPHA);
-        let of_coat = reflectance(s.cos_view, s.coat_alpha);
+        let roughness = m.clearcoat_roughness * x.coat_roughness;
+        s.coat_alpha = max(roughness * roughness, LEAST_ALPHA);
+        let of_coat = reflectance(coat_frame(s).cos_view, s.coat_alpha);
         s.coat_share = s.coat * (COAT_F0 * of_coat.x + of_coat.y);
         s.under = 1.0 - s.coat_share;
         s.diffuse *= s.under;
@@ -125,7 +136,7 @@ fn greatest_alpha(s: Gloss) -> f32 {
 
 // A lobe toward d: x is distribution and masking over 4 times both cosines, y the density by which directions are
 // drawn.
-fn lobe(s: Gloss, alpha: f32, d: vec3<f32>, half_way: vec3<f32>) -> vec2<f32> {
+fn lobe(s: Frame, alpha: f32, d: vec3<f32>, half_way: vec3<f32>) -> vec2<f32> {
     let cosine = max(dot(s.normal, d), 0.0);
     let across = cross(s.normal, half_way);
     let c = dot(s.normal, half_way);
@@ -183,7 +194,8 @@ fn reflected(s: Gloss, d: vec3<f32>) -> vec3<f32> {
     var sum = fresnel(s, half_way) * (s.under * facet_lobe(s, d, half_way).x) + sheen_toward(s, d, half_way);
     if s.coat > 0.0 {
         let f = grazing(half_way, s.view);
-        sum += vec3<f32>(s.coat * mix(COAT_F0, 1.0, f) * lobe(s, s.coat_alpha, d, half_way).x);
+        let of_coat = lobe(coat_frame(s), s.coat_alpha, d, half_way).x * coat_cosines(s, d);
+        sum += vec3<f32>(s.coat * mix(COAT_F0, 1.0, f) * of_coat);
     }
     return PI * sum;
 }
@@ -197,7 +209,7 @@ fn density_of(s: Gloss, d: vec3<f32>) -> f32 {
     let of_facets = 1.0 - s.choice - s.layers.choice;
     var density = of_facets * reflects_by(s, half_way) * facet_lobe(s, d, half_way).y + s.layers.choice / TURN;
     if s.coat > 0.0 {
-        density += s.choice * lobe(s, s.coat_alpha, d, half_way).y;
+        density += s.choice * lobe(coat_frame(s), s.coat_alpha, d, half_way).y;
     }
     return density;
 }
@@ -234,12 +246,16 @@ fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec4<f32> {
         return vec4<f32>(sheen_direction(s, words), 0.0);
     }
     var alphas = vec2<f32>(select(s.alpha, s.coat_alpha, is_coat));
-    var x = tangent(s.normal);
+    var frame = Frame(s.normal, s.cos_view);
+    if is_coat {
+        frame = coat_frame(s);
+    }
+    var x = tangent(frame.normal);
     if !is_coat {
         stretch(s, &x, &alphas);
     }
-    let y = cross(s.normal, x);
-    let v = normalize(vec3<f32>(alphas.x * dot(s.view, x), alphas.y * dot(s.view, y), s.cos_view));
+    let y = cross(frame.normal, x);
+    let v = normalize(vec3<f32>(alphas.x * dot(s.view, x), alphas.y * dot(s.view, y), frame.cos_view));
     let around = TURN * unit(words.x);
     let down = unit(words.y);
     // On the cap of heights -v.z to 1.
@@ -247,7 +263,7 @@ fn gloss_direction(s: Gloss, words: vec4<u32>) -> vec4<f32> {
     let level = sqrt(max((1.0 - height) * (1.0 + height), 0.0));
     let h = vec3<f32>(level * cos(around), level * sin(around), height) + v;
     let facet = normalize(vec3<f32>(alphas.x * h.x, alphas.y * h.y, max(h.z, 0.0)));
-    let half_way = facet.x * x + facet.y * y + facet.z * s.normal;
+    let half_way = facet.x * x + facet.y * y + facet.z * frame.normal;
     let cosine = dot(s.view, half_way);
     if s.eta > 0.0 && !is_coat && unit(pcg(words.z)) >= reflects_by(s, half_way) {
         let beyond = sqrt(max(squared_beyond(s, cosine), 0.0));

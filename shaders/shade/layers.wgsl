@@ -23,6 +23,8 @@ struct Layers {
     metallic: f32,        // of what is below
     dielectric: vec3<f32>, // what is below reflects along the normal
     dielectric_more: vec3<f32>, // by what further bounces between facets make it brighter
+    coat_normal: vec3<f32>,
+    coat_cos_view: f32,   // of the coat's normal and the view; 0: it has that of what is below
     metal: vec3<f32>,
     metal_more: vec3<f32>,
 }
@@ -34,22 +36,30 @@ fn numbers_of(word: f32) -> vec2<f32> {
 }
 
 // The layers of a surface whose normal, view and alpha are known.
-fn lay(s: ptr<function, Gloss>, g: GBuffer, m: Material) {
+fn lay(s: ptr<function, Gloss>, g: GBuffer, m: Material, x: More) {
+    var l: Layers;
+    // Where it is turned away from the view, the coat has the normal of what is below.
+    let coat_cos_view = dot(x.normal, (*s).view);
+    if (m.flags & MATERIAL_MORE) != 0u && coat_cos_view > LEAST_COS_VIEW {
+        l.coat_normal = x.normal;
+        l.coat_cos_view = coat_cos_view;
+    }
     if (m.flags & MATERIAL_LAYERS) == 0u {
+        (*s).layers = l;
         return;
     }
-    var l: Layers;
     let step = 1.0 / f32(LAYER_STEPS);
     let first = numbers_of(m.uv_from_set[1].w) * step;
     let second = numbers_of(m.uv_from_set[3].w) * step;
-    l.sheen = vec3<f32>(first, second.x);
+    l.sheen = vec3<f32>(first, second.x) * x.sheen;
     if max(l.sheen.x, max(l.sheen.y, l.sheen.z)) > 0.0 {
-        l.sheen_alpha = max(second.y * second.y, LEAST_SHEEN_ALPHA);
+        let roughness = second.y * x.sheen_roughness;
+        l.sheen_alpha = max(roughness * roughness, LEAST_SHEEN_ALPHA);
     }
     let n = (*s).normal;
     let stretch = numbers_of(m.uv_from_set[5].w);
     if stretch.x > 0.0 {
-        l.strength = stretch.x * step;
+        l.strength = stretch.x * step * x.anisotropy;
         l.alpha_along = mix((*s).alpha, 1.0, l.strength * l.strength);
         let beside = g.tangent - n * dot(n, g.tangent);
         let size = dot(beside, beside);
@@ -60,18 +70,38 @@ fn lay(s: ptr<function, Gloss>, g: GBuffer, m: Material) {
             side = sign(g.handedness);
         }
         let angle = TURN / f32(LAYER_STEPS + 1u) * stretch.y;
-        l.along = normalize(cos(angle) * t + sin(angle) * side * cross(n, t));
+        let length = sqrt(dot(x.along, x.along));
+        let a = select(vec2<f32>(1.0, 0.0), x.along / max(length, 1.0e-6), length > 1.0e-6);
+        let turned = vec2<f32>(cos(angle) * a.x - sin(angle) * a.y, sin(angle) * a.x + cos(angle) * a.y);
+        l.along = normalize(turned.x * t + turned.y * side * cross(n, t));
         l.across = cross(n, l.along);
     }
     // What rays pass straight through reflects for those that pass as well, and its film is left out.
     let passes = (m.flags & MATERIAL_REFRACTS) != 0u && (g.state & GBUFFER_REFRACTS) == 0u;
     let film = numbers_of(m.uv_from_set[7].w);
     if !passes {
-        l.film = film.x * step;
+        l.film = film.x * step * x.film;
         l.film_index = 1.0 + film.y / f32(LAYER_INDEX_STEPS);
-        l.film_thickness = numbers_of(m.uv_from_set[9].w).x;
+        let thickness = numbers_of(m.uv_from_set[9].w);
+        l.film_thickness = mix(thickness.y, thickness.x, x.film_thickness);
     }
     (*s).layers = l;
+}
+
+// The normal of the clear coat.
+fn coat_frame(s: Gloss) -> Frame {
+    if s.layers.coat_cos_view == 0.0 {
+        return Frame(s.normal, s.cos_view);
+    }
+    return Frame(s.layers.coat_normal, s.layers.coat_cos_view);
+}
+
+// The cosine of a direction and the coat's normal over that of what is below, by which its light is weighted.
+fn coat_cosines(s: Gloss, d: vec3<f32>) -> f32 {
+    if s.layers.coat_cos_view == 0.0 {
+        return 1.0;
+    }
+    return max(dot(s.layers.coat_normal, d), 0.0) / max(dot(s.normal, d), 1.0e-20);
 }
 
 // As `reflectance`, of facets that may be anisotropic.
@@ -112,7 +142,7 @@ fn facet_root(s: Gloss, d: vec3<f32>, cosine: f32) -> f32 {
 // As `lobe`, of the facets below the coat.
 fn facet_lobe(s: Gloss, d: vec3<f32>, half_way: vec3<f32>) -> vec2<f32> {
     if s.layers.alpha_along == 0.0 {
-        return lobe(s, s.alpha, d, half_way);
+        return lobe(Frame(s.normal, s.cos_view), s.alpha, d, half_way);
     }
     let cosine = max(dot(s.normal, d), 0.0);
     let squared = s.layers.alpha_along * s.alpha;

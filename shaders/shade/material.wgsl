@@ -10,6 +10,10 @@ fn texture_of(m: Material, place: u32) -> u32 {
     }
 }
 
+// Of a material without further textures.
+const WHOLE = More(vec3<f32>(1.0), 1.0, vec3<f32>(1.0), 1.0, vec3<f32>(0.0), 1.0, vec2<f32>(1.0, 0.0), 1.0, 1.0, 1.0, 1.0,
+    0u, 0u);
+
 // Unlit surfaces show their base colour whatever the light (KHR_materials_unlit).
 fn settled(g: GBuffer, flags: u32) -> GBuffer {
     var s = g;

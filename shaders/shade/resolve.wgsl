@@ -6,6 +6,7 @@
 #include "trace/cache.wgsl"
 #include "shade/shading.wgsl"
 #include "shade/material.wgsl"
+#include "shade/more.wgsl"
 
 // Of the angle between a ray and a normal; below it a footprint is that of this one.
 const LEAST_COSINE: f32 = 0.05;
@@ -152,7 +153,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             g.state |= 1u << (GBUFFER_FIRST + place);
         }
     }
-    if g.state != GBUFFER_READ || (material.flags & MATERIAL_ANISOTROPIC) != 0u {
+    if g.state != GBUFFER_READ || (material.flags & (MATERIAL_ANISOTROPIC | MATERIAL_MORE)) != 0u {
         g.footprint = footprint_of(seen_rays[index], hit.t, surface, uvs);
         if (b.flags & BRICK_DETAIL) != 0u {
             let w = place.world_from_object;
@@ -187,6 +188,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
             g.state &= ~(1u << (GBUFFER_FIRST + NORMAL));
         }
     }
+    start_more(index, g, n);
     if g.state == GBUFFER_READ {
         g = settled(g, material.flags);
     }

@@ -80,7 +80,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         return;
     }
     let g = gbuffer[index];
-    let s = gloss_of(g, -ray.direction);
+    let s = gloss_of(g, index, -ray.direction);
     var light = vec3<f32>(0.0);
     var mirrored = vec3<f32>(0.0);
     if (params.flags & PARAM_SUN) != 0u {

@@ -9,6 +9,7 @@ use crate::kernels::layout::{self, Params};
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::query::stand_ins;
 use crate::kernels::rays::RaySet;
+use crate::kernels::shade::more;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
 use crate::kernels::table::{self, Family, Target, names};
@@ -101,7 +102,12 @@ impl CpuExecutor {
             texels: Texels::new(&file)?,
             opacity: if opaque { Vec::new() } else { opacity },
             lamps: LampTables::default(),
-            buffers: Buffers { sets, pixels: Pixels::new(rays), tiles, families: Vec::new() },
+            buffers: Buffers {
+                sets,
+                pixels: Pixels::new(rays, more::is_needed(file.resident())),
+                tiles,
+                families: Vec::new(),
+            },
             binary: None,
             extent,
             view: Params::default(),
@@ -140,6 +146,12 @@ impl CpuExecutor {
     #[cfg(test)]
     pub(crate) fn gbuffer_of(&mut self, set: usize) -> &mut Vec<layout::GBuffer> {
         &mut self.buffers.pixels.gbuffers[set]
+    }
+
+    /// What further textures of the hits of a set show, for tests.
+    #[cfg(test)]
+    pub(crate) fn more_of(&mut self, set: usize) -> &mut Vec<layout::More> {
+        &mut self.buffers.pixels.mores[set]
     }
 
     /// Has the rays of a set such surfaces, for tests.
@@ -320,7 +332,8 @@ impl FrameExecutor for CpuExecutor {
         let has_bounces = !self.buffers.sets[2].rays.is_empty();
         self.extent = extent;
         self.buffers.sets = [extent.rays(), extent.rays(), 0].map(RaySet::new);
-        self.buffers.pixels = Pixels::new(extent.rays());
+        let has_more = !self.buffers.pixels.mores[0].is_empty();
+        self.buffers.pixels = Pixels::new(extent.rays(), has_more);
         self.buffers.tiles = TileLists::new(extent.tiles() as usize);
         if has_bounces {
             self.allow_bounces();

@@ -18,6 +18,7 @@ use super::timing::Timing;
 use super::wgsl::Pages;
 use crate::kernels::dispatch::{Dispatch, Workgroups, are_pairs_culled, dispatches};
 use crate::kernels::layout::Params;
+use crate::kernels::shade::more;
 use crate::kernels::table::{self, Bindings, Family, names};
 use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, layer_tables, layout, opacity,
@@ -116,7 +117,7 @@ impl GpuExecutor {
             texels: Texels::new(&gpu, &scene, setup.keep.textures)?,
             lamps: LampBuffers::new(&gpu, kernels.pages),
             sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
-            pixels: PixelBuffers::new(&gpu, extent.rays(), 0),
+            pixels: PixelBuffers::new(&gpu, (extent.rays(), 0), more::is_needed(scene.resident())),
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),
             demand: storage(&gpu, "demand", bricks, size_of::<layout::Demand>()),
             counters: storage(&gpu, "counters", layout::COUNTERS_AND_WORK, 4),
@@ -167,6 +168,17 @@ impl GpuExecutor {
     /// What is made of a family.
     fn family(&self, family: &'static Family) -> Option<&FamilyBuffers> {
         self.families.iter().find(|own| std::ptr::eq(own.family, family))
+    }
+
+    fn has_more(&self) -> bool {
+        more::is_needed(self.scene.resident())
+    }
+
+    /// The G-buffer of a set, without the half that keeps further textures.
+    fn gbuffer_of(&mut self, set: usize) -> Result<Vec<layout::GBuffer>, ExecutorError> {
+        let mut all = self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[set])?;
+        all.truncate(if self.has_more() { all.len() / 2 } else { all.len() });
+        Ok(all)
     }
 
     fn rebind(&mut self) {
@@ -388,7 +400,7 @@ impl FrameExecutor for GpuExecutor {
         let bounces = if self.has_bounces { rays } else { 0 };
         self.extent = extent;
         self.buffers.sets = [rays, rays, bounces].map(|rays| RayBuffers::new(&self.gpu, rays));
-        self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, bounces);
+        self.buffers.pixels = PixelBuffers::new(&self.gpu, (rays, bounces), self.has_more());
         self.buffers.tiles = TileBuffers::new(&self.gpu, extent, self.buffers.tiles.capacity);
         self.rebind();
         Ok(())
@@ -398,7 +410,7 @@ impl FrameExecutor for GpuExecutor {
         self.has_bounces = true;
         let rays = self.extent.rays();
         self.buffers.sets[2] = RayBuffers::new(&self.gpu, rays);
-        self.buffers.pixels = PixelBuffers::new(&self.gpu, rays, rays);
+        self.buffers.pixels = PixelBuffers::new(&self.gpu, (rays, rays), self.has_more());
         self.rebind();
     }
 
@@ -515,7 +527,7 @@ impl FrameExecutor for GpuExecutor {
     }
 
     fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[0])
+        self.gbuffer_of(0)
     }
 
     fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {

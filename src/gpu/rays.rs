@@ -44,7 +44,7 @@ pub struct TileBuffers {
 
 /// What shading keeps per pixel.
 pub struct PixelBuffers {
-    /// [`layout::GBuffer`] of the hits of sets 0 and 1.
+    /// [`layout::GBuffer`] of the hits of sets 0 and 1. In scenes with further textures a second half keeps those.
     pub gbuffers: [wgpu::Buffer; 2],
     /// Radiance summed over the samples of a batch.
     pub radiance: wgpu::Buffer,
@@ -111,9 +111,11 @@ impl TileBuffers {
 }
 
 impl PixelBuffers {
-    /// For `rays` pixels, of which `bounces` have rays in set 1 whose hits are shaded.
-    pub fn new(gpu: &Gpu, rays: usize, bounces: usize) -> Self {
-        let gbuffer = |count| storage(gpu, "gbuffer", count, size_of::<layout::GBuffer>());
+    /// For `rays` pixels, of which `bounces` have rays in set 1 whose hits are shaded; `has_more`: of a scene with
+    /// further textures.
+    pub fn new(gpu: &Gpu, (rays, bounces): (usize, usize), has_more: bool) -> Self {
+        let halves = if has_more { 2 } else { 1 };
+        let gbuffer = |count| storage(gpu, "gbuffer", halves * count, size_of::<layout::GBuffer>());
         Self {
             gbuffers: [gbuffer(rays), gbuffer(bounces)],
             radiance: storage(gpu, "radiance", rays, 16),

@@ -32,7 +32,7 @@ pub struct Pages {
     pub opacity: bool,
     /// Whether surfaces reflect otherwise than diffusely.
     pub gloss: bool,
-    /// Whether some of these surfaces have sheen, anisotropy or thin films.
+    /// Whether some of these surfaces have sheen, anisotropy, thin films or further textures.
     pub layers: bool,
     /// Whether levels of detail stand for bricks.
     pub levels: bool,
@@ -77,6 +77,8 @@ fn append(
         "shade/cones.wgsl" if !pages.levels => NO_CONES.into(),
         "shade/gloss.wgsl" if !pages.gloss => MATT.into(),
         "shade/layers.wgsl" if !pages.layers => NO_LAYERS.into(),
+        "shade/more.wgsl" if !pages.layers => WHOLE_ALONE.into(),
+        "texture/more.wgsl" if !pages.layers => NO_MORE_LOOKUPS.into(),
         _ => file(name)?,
     };
     for line in text.lines() {
@@ -174,7 +176,7 @@ const MATT: &str = "\
 struct Gloss {
     diffuse: vec3<f32>,
 }
-fn gloss_of(g: GBuffer, view: vec3<f32>) -> Gloss {
+fn gloss_of(g: GBuffer, index: u32, view: vec3<f32>) -> Gloss {
     return Gloss(g.albedo);
 }
 fn is_glossy(s: Gloss) -> bool {
@@ -215,12 +217,33 @@ fn left_within(g: GBuffer, way: f32) -> vec3<f32> {
 }
 ";
 
+/// What stands for `shade/more.wgsl` where no material has layers.
+const WHOLE_ALONE: &str = "\
+fn start_more(index: u32, g: GBuffer, normal: vec3<f32>) {}
+fn more_of(g: GBuffer, index: u32) -> More {
+    return WHOLE;
+}
+";
+
+/// What stands for `texture/more.wgsl` there.
+const NO_MORE_LOOKUPS: &str = "\
+fn look_up_more(g: GBuffer, index: u32) -> bool {
+    return false;
+}
+";
+
 /// What stands for `shade/layers.wgsl` where no material has sheen, anisotropy or a thin film.
 const NO_LAYERS: &str = "\
 struct Layers {
     choice: f32,
 }
-fn lay(s: ptr<function, Gloss>, g: GBuffer, m: Material) {}
+fn lay(s: ptr<function, Gloss>, g: GBuffer, m: Material, x: More) {}
+fn coat_frame(s: Gloss) -> Frame {
+    return Frame(s.normal, s.cos_view);
+}
+fn coat_cosines(s: Gloss, d: vec3<f32>) -> f32 {
+    return 1.0;
+}
 fn facets_around(s: Gloss) -> vec2<f32> {
     return reflectance(s.cos_view, s.alpha);
 }
@@ -229,7 +252,7 @@ fn facet_root(s: Gloss, d: vec3<f32>, cosine: f32) -> f32 {
     return sqrt(squared + (1.0 - squared) * cosine * cosine);
 }
 fn facet_lobe(s: Gloss, d: vec3<f32>, half_way: vec3<f32>) -> vec2<f32> {
-    return lobe(s, s.alpha, d, half_way);
+    return lobe(Frame(s.normal, s.cos_view), s.alpha, d, half_way);
 }
 fn stretch(s: Gloss, x: ptr<function, vec3<f32>>, alphas: ptr<function, vec2<f32>>) {}
 fn lay_film(s: ptr<function, Gloss>, left: ptr<function, vec3<f32>>, specular: vec3<f32>, g: GBuffer, white: f32, \

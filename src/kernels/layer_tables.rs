@@ -6,7 +6,7 @@ use super::layout::{
     STRETCHED_STRENGTHS,
 };
 use super::reflectance::REFLECTANCES;
-use bricks::{MATERIAL_LAYERS, Resident};
+use bricks::{MATERIAL_LAYERS, MATERIAL_MORE, Resident};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
@@ -18,9 +18,9 @@ const HEIGHTS: usize = 48;
 const SHEEN_ANGLES: usize = 48;
 const SHEEN_HEIGHTS: usize = 96;
 
-/// Whether some material of the scene has layers.
+/// Whether some material of the scene has layers, or further textures, which the same kernels read.
 pub fn is_needed(resident: &Resident) -> bool {
-    resident.materials.iter().any(|material| material.flags & MATERIAL_LAYERS != 0)
+    resident.materials.iter().any(|material| material.flags & (MATERIAL_LAYERS | MATERIAL_MORE) != 0)
 }
 
 /// The table of reflectances, and behind it:

@@ -216,9 +216,9 @@ kernels! {
 
     clear_gbuffer: "shade/clear_gbuffer" Shading [] |b, t| clear_gbuffer(b, t.pixels, t.shaded);
     resolve: "shade/resolve" CacheShading []
-        |b, t| resolve(b, t.seen, &mut t.pixels.gbuffers[t.shaded], t.materials, t.attributes);
+        |b, t| resolve(b, t.seen, t.pixels.of_set(t.shaded), t.materials, t.attributes);
     sample: "texture/sample" Sampling []
-        |b, t| sample(b, &mut t.pixels.gbuffers[t.shaded], t.sampling, t.tile_demand);
+        |b, t| sample(b, t.pixels.of_set(t.shaded), t.sampling, t.tile_demand);
     shade: "shade/shade" Shading [] |b, t| shade(b, t.pixels, t.shaded, t.seen, t.materials);
     add_light: "shade/add_light" Shading [] |b, t| add_light(b, t.pixels, t.shaded, (t.seen, t.own), t.materials);
     add_occlusion: "shade/add_occlusion" Shading []

@@ -40,8 +40,8 @@ struct Pool {
 
 impl Pool {
     /// Those that `device` takes pictures from.
-    fn of(settings: &Settings, device: &Device) -> Vec<Self> {
-        let PictureBytes { device: on_device, filter, host, band, joined } = PictureBytes::of(settings);
+    fn of(settings: &Settings, device: &Device, has_more: bool) -> Vec<Self> {
+        let PictureBytes { device: on_device, filter, host, band, joined } = PictureBytes::of(settings, has_more);
         let [available, local] = [cpu::available_memory(), device.local_memory()];
         let of_host = Self { what: "memory", available, whole: host, joined, band, has_cache: false };
         if device.is_host_memory() {
@@ -73,13 +73,14 @@ impl Pool {
 }
 
 impl Bands {
-    /// As many as `settings` ask for, or as the memory of `device` and of the host need.
+    /// As many as `settings` ask for, or as the memory of `device` and of the host need; `has_more`: for a scene with
+    /// further textures.
     ///
     /// # Errors
     /// The picture is too large for a band, or to be joined, or for what needs all of it at once: how much it takes,
     /// how much there is, and the largest size that it is enough for.
-    pub fn of(settings: &Settings, device: &Device) -> Result<Self> {
-        Self::within(settings, &Pool::of(settings, device), device.most_rays())
+    pub fn of(settings: &Settings, device: &Device, has_more: bool) -> Result<Self> {
+        Self::within(settings, &Pool::of(settings, device, has_more), device.most_rays())
     }
 
     fn within(settings: &Settings, pools: &[Pool], most_rays: u64) -> Result<Self> {
@@ -148,18 +149,18 @@ impl Bands {
 ///
 /// # Errors
 /// How much they take, how much there is, and the largest size that it is enough for.
-pub fn check_whole(settings: &Settings, before: &Settings, is_on_host: bool) -> Result<()> {
-    check_within(settings, before, is_on_host, cpu::available_memory)
+pub fn check_whole(settings: &Settings, before: &Settings, (is_on_host, has_more): (bool, bool)) -> Result<()> {
+    check_within(settings, before, (is_on_host, has_more), cpu::available_memory)
 }
 
 fn check_within(
     settings: &Settings,
     before: &Settings,
-    is_on_host: bool,
+    (is_on_host, has_more): (bool, bool),
     available: impl FnOnce() -> Option<u64>,
 ) -> Result<()> {
     let of = |settings: &Settings| {
-        let PictureBytes { device, filter, host, .. } = PictureBytes::of(settings);
+        let PictureBytes { device, filter, host, .. } = PictureBytes::of(settings, has_more);
         let pixels = u64::from(settings.size.width) * u64::from(settings.size.height);
         let a_pixel = host + if is_on_host { device + filter } else { 0 };
         (pixels * a_pixel, a_pixel)
@@ -184,7 +185,7 @@ mod tests {
 
     /// Memory of so many bytes, of a processor.
     fn pools(settings: &Settings, available: Option<u64>) -> [Pool; 1] {
-        let PictureBytes { device, filter, host, band, joined } = PictureBytes::of(settings);
+        let PictureBytes { device, filter, host, band, joined } = PictureBytes::of(settings, false);
         [Pool {
             what: "memory",
             available,
@@ -211,7 +212,7 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_rendered_in_as_few_bands_as_memory_needs() {
         let options = "--size 16384x16000 --effects shadow";
-        let PictureBytes { device, band, joined, .. } = PictureBytes::of(&settings(options));
+        let PictureBytes { device, band, joined, .. } = PictureBytes::of(&settings(options), false);
         let found = [12 << 30, 16 << 30, 64 << 30].map(|available| {
             let Bands { rows, room, why } = bands(options, Some(available)).unwrap();
             let why = why.unwrap();
@@ -273,24 +274,25 @@ mod tests {
     fn what_takes_the_place_of_another_picture_must_fit() {
         let of = |options: &str| Settings::from_options(options).unwrap();
         let (small, large) = (of("--size 640x360"), of("--size 16384x16384"));
-        let error = check_within(&large, &small, true, || Some(8 << 30)).unwrap_err().to_string();
+        let error = check_within(&large, &small, (true, false), || Some(8 << 30)).unwrap_err().to_string();
         assert!(
             error.starts_with("--size 16384x16384: pictures take") && error.contains("give at most --size"),
             "{error}"
         );
         // What it says is enough is enough.
         let at_most = error.rsplit("--size ").next().unwrap();
-        check_within(&of(&format!("--size {at_most}")), &small, true, || Some(8 << 30)).unwrap();
-        check_within(&large, &small, true, || Some(1 << 40)).unwrap();
-        check_within(&large, &small, true, || None).unwrap();
+        check_within(&of(&format!("--size {at_most}")), &small, (true, false), || Some(8 << 30)).unwrap();
+        check_within(&large, &small, (true, false), || Some(1 << 40)).unwrap();
+        check_within(&large, &small, (true, false), || None).unwrap();
         // What is no larger is not asked about, and what is held already is there.
-        check_within(&small, &large, true, || panic!("asked")).unwrap();
-        check_within(&of("--size 641x360"), &small, true, || Some(1 << 20)).unwrap();
+        check_within(&small, &large, (true, false), || panic!("asked")).unwrap();
+        check_within(&of("--size 641x360"), &small, (true, false), || Some(1 << 20)).unwrap();
         // Of a device with memory of its own, the host has the smaller part.
         let middle = of("--size 4096x4096");
         let free = || Some(3 << 30);
         assert!(
-            check_within(&middle, &small, false, free).is_ok() && check_within(&middle, &small, true, free).is_err()
+            check_within(&middle, &small, (false, false), free).is_ok()
+                && check_within(&middle, &small, (true, false), free).is_err()
         );
     }
 }

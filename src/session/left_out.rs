@@ -4,7 +4,8 @@ use super::opened::Opened;
 use super::renderer::lit_renderer;
 use crate::frame::{FrameWatch, Light, RenderError, Renderer};
 use crate::kernels::layout::{GBuffer, Hit, Ray, Surface};
-use crate::kernels::{Keep, opacity, reflectance};
+use crate::kernels::shade::more;
+use crate::kernels::{Keep, layer_tables, opacity, reflectance};
 use crate::scene::Camera;
 use crate::secondary::Method;
 use crate::secondary::roma::answer::Roma;
@@ -106,6 +107,10 @@ pub fn components(renderer: &mut Renderer, settings: &Settings) -> Vec<Component
         keep: Some(Keeper::Kernels(|keep| keep.gloss = true)),
         ..of(reflectance::is_needed(resident), "reflections other than diffuse ones", gloss, by(can.gloss), None)
     });
+    let layers = ["some surfaces have layers or further textures", "no surface has layers or further textures"];
+    let has_more = more::is_needed(resident);
+    let of_hits = has_more.then_some(2 * rays * size_of::<GBuffer>() as u64);
+    list.push(of(layer_tables::is_needed(resident), "layers of materials", layers, by(can.gloss), of_hits));
     let instances = ["instances place objects", "everything is baked into the world"];
     list.push(of(manifest.has_instances, "instance transforms", instances, How::Branch, None));
     let wide = ["some bricks are far from their object's origin", "every brick is near"];

@@ -10,6 +10,7 @@ use super::renderer::render_settings;
 use crate::frame::{Answered, Answers, Budgeted, RenderError, RenderSettings};
 use crate::kernels::Extent;
 use crate::kernels::layout::{Hit, NONE, Surface};
+use crate::kernels::shade::more;
 use crate::picture::denoise::Resolve;
 use crate::picture::exposure::Meter;
 use crate::scene::Camera;
@@ -62,7 +63,9 @@ impl Session {
         }
         settings.check()?;
         let suited = settings.suited(&self.renderer.scene.resident().manifest);
-        bands::check_whole(&suited, &self.settings, self.renderer.executor.device().backend == "cpu")?;
+        let is_on_host = self.renderer.executor.device().backend == "cpu";
+        let has_more = more::is_needed(self.renderer.scene.resident());
+        bands::check_whole(&suited, &self.settings, (is_on_host, has_more))?;
         let lighting = match self.settings.lights_otherwise(&suited) {
             true => Some(lighting(&suited, &self.renderer.scene, &self.file)?),
             false => None,

@@ -4,6 +4,7 @@ use super::bands::Bands;
 use super::device::Device;
 use super::hidden;
 use crate::cpu::available_memory;
+use crate::kernels::shade::more;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::output::atomic;
 use crate::schedule::ExecutorError;
@@ -116,7 +117,7 @@ impl Opened {
             }
         }
         let device = Device::open(&settings.adapter)?;
-        let Bands { rows, room, why } = Bands::of(settings, &device)?;
+        let Bands { rows, room, why } = Bands::of(settings, &device, more::is_needed(scene.resident()))?;
         let bytes = room.map_or(device.room(), |left| left.min(device.room()));
         let mut room = Room { page_bytes: device.page_bytes(), bytes, rows };
         let mut opened = loop {

@@ -43,11 +43,11 @@ const FILTER: u64 =
 const FINISH: u64 = 12 + 4 + 4;
 
 impl PictureBytes {
-    /// Those of a pixel.
-    pub fn of(settings: &Settings) -> Self {
+    /// Those of a pixel; `has_more`: of a scene with further textures.
+    pub fn of(settings: &Settings, has_more: bool) -> Self {
         let bytes = |sizes: &[usize]| sizes.iter().sum::<usize>() as u64;
         let set = bytes(&[size_of::<Ray>(), size_of::<Hit>(), size_of::<Surface>()]);
-        let shading = size_of::<GBuffer>() as u64;
+        let shading = (size_of::<GBuffer>() * if has_more { 2 } else { 1 }) as u64;
         // Light that comes by a bounce has a set of rays, what shading keeps, a share and a density more.
         let bounces = if settings.effects.diffuse || settings.effects.glossy { set + shading + 20 } else { 0 };
         let device = 2 * set + shading + 16 + bounces;
@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn what_takes_more_is_counted() {
-        let of = |options: &str| PictureBytes::of(&Settings::from_options(options).unwrap());
+        let of = |options: &str| PictureBytes::of(&Settings::from_options(options).unwrap(), false);
         let plain = of("--effects shadow");
         assert_eq!(of("--effects shadow --spp 100"), plain);
         assert!(of("--effects shadow,diffuse").device > plain.device);
@@ -83,6 +83,8 @@ mod tests {
             let more = of(&format!("--effects shadow {options}"));
             assert!(more.host > plain.host && more.joined > plain.joined, "{options}");
         }
+        let further = PictureBytes::of(&Settings::from_options("--effects shadow").unwrap(), true);
+        assert_eq!(further.device, plain.device + size_of::<GBuffer>() as u64);
         assert_eq!(of("--effects shadow --measure-error").device, 2 * plain.device);
         // What bands are for.
         assert!(plain.joined * 8 < plain.device + plain.host);

@@ -70,6 +70,7 @@ mod scenes {
 mod shading {
     mod adaptive;
     mod aov;
+    mod further;
     mod glass;
     mod gloss;
     mod instances;

@@ -2,7 +2,7 @@
 
 use super::rule::{length, rule};
 use crate::error::{Flaw, Part};
-use crate::layers::{MATERIAL_ANISOTROPIC, MATERIAL_LAYERS};
+use crate::layers::{MATERIAL_ANISOTROPIC, MATERIAL_FURTHER, MATERIAL_LAYERS, MATERIAL_MORE};
 use crate::layout::Section;
 use crate::levels::Level;
 use crate::payload::Payload;
@@ -185,7 +185,7 @@ pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
         })?;
         let both = MATERIAL_MASK | MATERIAL_BLEND;
         let known = both | MATERIAL_DOUBLE_SIDED | MATERIAL_UNLIT | MATERIAL_REFRACTS;
-        let known = known | MATERIAL_LAYERS | MATERIAL_ANISOTROPIC;
+        let known = known | MATERIAL_LAYERS | MATERIAL_ANISOTROPIC | MATERIAL_MORE | MATERIAL_FURTHER;
         rule(material.flags & !known == 0 && material.flags & both != both, part, || {
             (format!("flags {:#x}", material.flags), "known flags, not both MASK and BLEND")
         })?;
@@ -221,6 +221,15 @@ pub(super) fn materials(resident: &Resident) -> Result<(), Flaw> {
                 format!("flags {:#x} and words of layers {words:?}", material.flags),
                 "words of 24 bits that the flags name",
             )
+        })?;
+        let is_further = material.flags & MATERIAL_FURTHER != 0;
+        let is_wanted = index > 0 && resident.materials[index as usize - 1].flags & MATERIAL_MORE != 0;
+        rule(is_further == is_wanted && (!is_further || material.is_sound_further()), part, || {
+            (format!("flags {:#x}", material.flags), "further textures of the material before, and nothing else")
+        })?;
+        let is_last = index as usize + 1 == resident.materials.len();
+        rule(!is_last || material.flags & MATERIAL_MORE == 0, part, || {
+            (format!("flags {:#x}", material.flags), "a record of further textures behind it")
         })?;
         let map = material.opacity_map;
         rule(map == NONE || (map as usize) < resident.opacity_maps.len(), part, || {

@@ -96,6 +96,19 @@ fn materials() {
         m.flags |= bricks::MATERIAL_LAYERS;
         m.uv_from_set[1][3] = 0.5;
     });
+    // Further textures follow the material that has them, and are nothing else.
+    material("flags 0x100", |m| *m = Material::further());
+    let mut resident = written().2.resident;
+    let last = resident.materials.len() - 1;
+    resident.materials[last - 1].flags |= bricks::MATERIAL_MORE;
+    resident.materials[last] = Material { normal_scale: 0.5, normal_texture: 0, ..Material::further() };
+    validate::resident(&resident).unwrap();
+    resident.materials[last].roughness = 0.5;
+    assert!(validate::resident(&resident).is_err());
+    let last = last as u32;
+    refused(Section::Materials, last, "flags", |r| {
+        r.materials.last_mut().into_iter().for_each(|m| m.flags |= bricks::MATERIAL_MORE);
+    });
 }
 
 #[test]

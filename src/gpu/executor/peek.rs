@@ -20,6 +20,36 @@ impl GpuExecutor {
 
     /// The G-buffer of the hits of a set.
     pub fn read_gbuffer_of(&mut self, set: usize) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[set])
+        self.gbuffer_of(set)
+    }
+
+    /// What further textures of the hits of a set show; empty in scenes without.
+    pub fn read_more_of(&mut self, set: usize) -> Result<Vec<layout::More>, ExecutorError> {
+        if !self.has_more() {
+            return Ok(Vec::new());
+        }
+        let all: Vec<layout::GBuffer> = self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[set])?;
+        Ok(all[all.len() / 2..].iter().map(kept).collect())
+    }
+}
+
+/// What `shaders/shade/more_kept.wgsl` keeps in a record of the G-buffer.
+fn kept(g: &layout::GBuffer) -> layout::More {
+    let [coat, coat_roughness] = g.uv;
+    let [anisotropy, film, film_thickness] = g.tangent;
+    layout::More {
+        specular: g.albedo,
+        specular_weight: g.footprint,
+        sheen: g.emission,
+        sheen_roughness: g.handedness,
+        normal: g.normal,
+        coat,
+        along: g.weights,
+        anisotropy,
+        coat_roughness,
+        film,
+        film_thickness,
+        state: g.state,
+        padding0: 0,
     }
 }

@@ -5,6 +5,7 @@ use super::choose::{Chosen, choose_direction, choose_emitter};
 use super::cones::{self, widen};
 use super::gloss::{Drawn, Gloss, left_within};
 use super::lamps::{environment_sample, lamp_words, shines};
+use super::more::Shown;
 use super::random::{disc_point, tangent};
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
@@ -202,7 +203,7 @@ pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffe
 /// As [`generate_occlusion`], of unlimited length. The throughput is noted: what of light from around the surface
 /// reflects, by the share of the direction; in w the direction's number.
 pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
-    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
+    let Pixels { gbuffers: [gbuffer, _], mores: [mores, _], throughput, densities, .. } = pixels;
     for_each_leaving(own, seen, |index, surface| {
         leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
     });
@@ -213,7 +214,7 @@ pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: 
         *carried = [0.0, 0.0, 0.0, number];
         *density = bound.params.diffuse_count * most(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
         if ray.t_min <= ray.t_max {
-            let g = &gbuffer[index];
+            let g = Shown::of(gbuffer, mores, index);
             let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
             let reflected = s.reflected_by_diffuse_rays(bound);
             (0..3).for_each(|k| carried[k] = bound.params.share * reflected[k]);
@@ -225,10 +226,10 @@ pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: 
 /// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the
 /// direction was drawn are noted.
 pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
-    let Pixels { gbuffers: [gbuffer, _], throughput, densities, .. } = pixels;
+    let Pixels { gbuffers: [gbuffer, _], mores: [mores, _], throughput, densities, .. } = pixels;
     let p = bound.params;
     let gloss = |index: usize| {
-        let g = &gbuffer[index];
+        let g = Shown::of(gbuffer, mores, index);
         Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x))
     };
     for_each_leaving(own, seen, |index, surface| {

@@ -1,12 +1,13 @@
 //! How surfaces reflect otherwise than diffusely: twin of `shaders/shade/gloss.wgsl`.
 
 use super::lamps::unit;
-use super::layers::{Below, Layers, table_at};
+use super::layers::{Below, Frame, LEAST_COS_VIEW, Layers, table_at};
 use super::light::ambient;
+use super::more::Shown;
 use super::random::tangent;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
-    GBUFFER_BACK, GBUFFER_REFRACTS, GBuffer, MATERIAL_LAYERS, MATERIAL_REFRACTS, MATERIAL_UNLIT, PARAM_BOUNCE,
+    GBUFFER_BACK, GBUFFER_REFRACTS, GBuffer, MATERIAL_LAYERS, MATERIAL_REFRACTS, MATERIAL_UNLIT, More, PARAM_BOUNCE,
     PARAM_GLOSSY,
 };
 use crate::kernels::reflectance::REFLECTANCES;
@@ -19,8 +20,6 @@ use std::f32::consts::{PI, TAU};
 const LEAST_ALPHA: f32 = 0.001;
 /// What a clear coat reflects along its normal (KHR_materials_clearcoat: index of refraction 1.5).
 const COAT_F0: f32 = 0.04;
-/// Views are not flatter.
-const LEAST_COS_VIEW: f32 = 1.0e-4;
 
 /// How a hit reflects; of Lambertian ones all but `diffuse` is zero.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,7 +65,9 @@ pub struct Drawn {
 
 impl Gloss {
     /// Of a hit seen along -view, of any length.
-    pub fn of(g: &GBuffer, m: &Material, view: Vec3) -> Self {
+    pub fn of<'a>(hit: impl Into<Shown<'a>>, m: &Material, view: Vec3) -> Self {
+        let shown = hit.into();
+        let (g, x): (&GBuffer, More) = (&shown, shown.more(m));
         let mut s = Self { diffuse: g.albedo, ..Self::default() };
         let has_layers = m.flags & MATERIAL_LAYERS != 0;
         let is_matt = !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0 || has_layers);
@@ -77,11 +78,13 @@ impl Gloss {
         s.view = normalize(view);
         s.cos_view = most(dot(s.normal, s.view), LEAST_COS_VIEW);
         s.alpha = most(g.roughness * g.roughness, LEAST_ALPHA);
-        s.layers = Layers::of(g, m, &s.below());
+        s.layers = Layers::of(g, (m, &x), &s.below());
         let stretched = s.layers.and_then(|layers| layers.facets_around(&s.below()));
         let [along, grazing] = stretched.unwrap_or_else(|| table_at(&REFLECTANCES, s.cos_view, s.alpha));
         let white = along + grazing;
-        let (mut bounces, mut specular, mut inside) = ((1.0 - white) / white, m.specular, 0.0);
+        let mut specular = each(|k| m.specular[k] * (x.specular[k] * x.specular_weight));
+        let specular_weight = m.specular_weight * x.specular_weight;
+        let (mut bounces, mut inside) = ((1.0 - white) / white, 0.0);
         if m.flags & MATERIAL_REFRACTS != 0 {
             if g.state & GBUFFER_REFRACTS != 0 {
                 let root = m.specular[0].sqrt();
@@ -96,9 +99,9 @@ impl Gloss {
         let of_dielectric = specular.map(|c| 1.0 + c * bounces);
         let of_metal = g.albedo.map(|c| 1.0 + c * bounces);
         s.f0 = each(|k| mix(specular[k] * of_dielectric[k], g.albedo[k] * of_metal[k], g.metallic));
-        s.f90 = each(|k| mix(m.specular_weight * of_dielectric[k], of_metal[k], g.metallic));
+        s.f90 = each(|k| mix(specular_weight * of_dielectric[k], of_metal[k], g.metallic));
         s.share = each(|k| s.f0[k] * along + s.f90[k] * grazing);
-        let mut left = each(|k| 1.0 - (specular[k] * along + m.specular_weight * grazing) * of_dielectric[k]);
+        let mut left = each(|k| 1.0 - (specular[k] * along + specular_weight * grazing) * of_dielectric[k]);
         let below = s.below();
         if let Some(layers) = &mut s.layers {
             layers.lay_film(&below, (&mut s.share, &mut left), specular, g, [white, bounces]);
@@ -106,11 +109,12 @@ impl Gloss {
         let below_facets = g.albedo.map(|c| c * (1.0 - g.metallic));
         s.diffuse = each(|k| below_facets[k] * (1.0 - inside) * most(left[k], 0.0));
         s.through = below_facets.map(|c| c * inside);
-        s.coat = m.clearcoat;
+        s.coat = m.clearcoat * x.coat;
         s.under = 1.0;
         if s.coat > 0.0 {
-            s.coat_alpha = most(m.clearcoat_roughness * m.clearcoat_roughness, LEAST_ALPHA);
-            let of_coat = table_at(&REFLECTANCES, s.cos_view, s.coat_alpha);
+            let roughness = m.clearcoat_roughness * x.coat_roughness;
+            s.coat_alpha = most(roughness * roughness, LEAST_ALPHA);
+            let of_coat = table_at(&REFLECTANCES, s.coat_frame().cos_view, s.coat_alpha);
             s.coat_share = s.coat * (COAT_F0 * of_coat[0] + of_coat[1]);
             s.under = 1.0 - s.coat_share;
             s.diffuse = s.diffuse.map(|c| c * s.under);
@@ -150,28 +154,28 @@ impl Gloss {
     /// The lobe of the facets below the coat.
     fn facet_lobe(&self, d: Vec3, half_way: Vec3) -> [f32; 2] {
         let stretched = self.layers.as_ref().and_then(|layers| layers.facet_lobe(&self.below(), d, half_way));
-        stretched.unwrap_or_else(|| self.lobe(self.alpha, d, half_way))
+        stretched.unwrap_or_else(|| self.frame().lobe(self.alpha, d, half_way))
+    }
+
+    /// The side of the facets below the coat that is seen.
+    fn frame(&self) -> Frame {
+        Frame { normal: self.normal, cos_view: self.cos_view }
+    }
+
+    /// That of the coat.
+    fn coat_frame(&self) -> Frame {
+        self.layers.as_ref().and_then(|layers| layers.coat).unwrap_or_else(|| self.frame())
+    }
+
+    /// The cosine of a direction and the coat's normal over that of what is below, by which its light is weighted.
+    fn coat_cosines(&self, d: Vec3) -> f32 {
+        let coat = self.layers.as_ref().and_then(|layers| layers.coat);
+        coat.map_or(1.0, |coat| most(dot(coat.normal, d), 0.0) / most(dot(self.normal, d), 1.0e-20))
     }
 
     /// Whether there is more than the diffuse part.
     pub fn is_glossy(&self) -> bool {
         self.alpha > 0.0
-    }
-
-    /// A lobe toward d: distribution and masking over 4 times both cosines, and the density by which directions are
-    /// drawn.
-    fn lobe(&self, alpha: f32, d: Vec3, half_way: Vec3) -> [f32; 2] {
-        let cosine = most(dot(self.normal, d), 0.0);
-        let across = cross(self.normal, half_way);
-        let c = dot(self.normal, half_way);
-        let squared = alpha * alpha;
-        // The squared sine by the cross product: that of small angles is not lost.
-        let q = squared * c * c + dot(across, across);
-        let distribution = squared / (PI * q * q);
-        let by_view = (squared + (1.0 - squared) * self.cos_view * self.cos_view).sqrt();
-        let by_light = (squared + (1.0 - squared) * cosine * cosine).sqrt();
-        let masked = 0.5 / most(cosine * by_view + self.cos_view * by_light, 1.0e-20);
-        [distribution * masked, 0.5 * distribution / (self.cos_view + by_view)]
     }
 
     fn grazing(&self, half_way: Vec3) -> f32 {
@@ -225,7 +229,8 @@ impl Gloss {
         }
         if self.coat > 0.0 {
             let f = self.grazing(half_way);
-            let of_coat = self.coat * mix(COAT_F0, 1.0, f) * self.lobe(self.coat_alpha, d, half_way)[0];
+            let lobe = self.coat_frame().lobe(self.coat_alpha, d, half_way)[0] * self.coat_cosines(d);
+            let of_coat = self.coat * mix(COAT_F0, 1.0, f) * lobe;
             sum = sum.map(|c| c + of_coat);
         }
         sum.map(|c| PI * c)
@@ -241,7 +246,7 @@ impl Gloss {
         let by_facets = of_facets * self.reflects_by(half_way) * self.facet_lobe(d, half_way)[1];
         let mut density = by_facets + self.sheen_choice() / TAU;
         if self.coat > 0.0 {
-            density += self.choice * self.lobe(self.coat_alpha, d, half_way)[1];
+            density += self.choice * self.coat_frame().lobe(self.coat_alpha, d, half_way)[1];
         }
         density
     }
@@ -292,9 +297,10 @@ impl Gloss {
         }
         let alpha = if is_coat { self.coat_alpha } else { self.alpha };
         let stretched = layers.and_then(|layers| layers.stretched(&self.below()));
-        let (x, alphas) = stretched.unwrap_or_else(|| (tangent(self.normal), [alpha; 2]));
-        let y = cross(self.normal, x);
-        let v = normalize([alphas[0] * dot(self.view, x), alphas[1] * dot(self.view, y), self.cos_view]);
+        let frame = if is_coat { self.coat_frame() } else { self.frame() };
+        let (x, alphas) = stretched.unwrap_or_else(|| (tangent(frame.normal), [alpha; 2]));
+        let y = cross(frame.normal, x);
+        let v = normalize([alphas[0] * dot(self.view, x), alphas[1] * dot(self.view, y), frame.cos_view]);
         let around = TAU * unit(words[0]);
         let down = unit(words[1]);
         // On the cap of heights -v.z to 1.
@@ -302,7 +308,7 @@ impl Gloss {
         let level = most((1.0 - height) * (1.0 + height), 0.0).sqrt();
         let h = [level * around.cos() + v[0], level * around.sin() + v[1], height + v[2]];
         let facet = normalize([alphas[0] * h[0], alphas[1] * h[1], most(h[2], 0.0)]);
-        let half_way = each(|k| facet[0] * x[k] + facet[1] * y[k] + facet[2] * self.normal[k]);
+        let half_way = each(|k| facet[0] * x[k] + facet[1] * y[k] + facet[2] * frame.normal[k]);
         let cosine = dot(self.view, half_way);
         if self.eta > 0.0 && !is_coat && unit(pcg(words[2])) >= self.reflects_by(half_way) {
             let along = self.eta * cosine - most(self.squared_beyond(cosine), 0.0).sqrt();

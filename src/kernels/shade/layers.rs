@@ -6,9 +6,9 @@ use super::lamps::unit;
 use super::random::tangent;
 use crate::kernels::layer_tables::{LAYER_TABLES, LEAST_SHEEN_ALPHA};
 use crate::kernels::layout::{
-    GBUFFER_REFRACTS, GBuffer, LAYER_BITS, LAYER_INDEX_STEPS, LAYER_STEPS, MATERIAL_LAYERS, MATERIAL_REFRACTS,
-    REFLECTANCE_SIZE, SHEENS, STRETCHED, STRETCHED_AZIMUTHS, STRETCHED_COSINES, STRETCHED_ROUGHNESSES,
-    STRETCHED_STRENGTHS,
+    GBUFFER_REFRACTS, GBuffer, LAYER_BITS, LAYER_INDEX_STEPS, LAYER_STEPS, MATERIAL_LAYERS, MATERIAL_MORE,
+    MATERIAL_REFRACTS, More, REFLECTANCE_SIZE, SHEENS, STRETCHED, STRETCHED_AZIMUTHS, STRETCHED_COSINES,
+    STRETCHED_ROUGHNESSES, STRETCHED_STRENGTHS,
 };
 use crate::kernels::vector::{Vec3, cross, dot, each, mix, most, most3, normalize};
 use bricks::Material;
@@ -45,6 +45,33 @@ pub(super) struct Layers {
     dielectric_more: Vec3,
     metal: Vec3,
     metal_more: Vec3,
+    /// Of the clear coat; `None`: that of what is below.
+    pub coat: Option<Frame>,
+}
+
+/// The side of a lobe that is seen: its normal, and the cosine of that and the view.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Frame {
+    pub normal: Vec3,
+    pub cos_view: f32,
+}
+
+impl Frame {
+    /// A lobe toward d: distribution and masking over 4 times both cosines, and the density by which directions are
+    /// drawn.
+    pub fn lobe(&self, alpha: f32, d: Vec3, half_way: Vec3) -> [f32; 2] {
+        let cosine = most(dot(self.normal, d), 0.0);
+        let across = cross(self.normal, half_way);
+        let c = dot(self.normal, half_way);
+        let squared = alpha * alpha;
+        // The squared sine by the cross product: that of small angles is not lost.
+        let q = squared * c * c + dot(across, across);
+        let distribution = squared / (PI * q * q);
+        let by_view = (squared + (1.0 - squared) * self.cos_view * self.cos_view).sqrt();
+        let by_light = (squared + (1.0 - squared) * cosine * cosine).sqrt();
+        let masked = 0.5 / most(cosine * by_view + self.cos_view * by_light, 1.0e-20);
+        [distribution * masked, 0.5 * distribution / (self.cos_view + by_view)]
+    }
 }
 
 /// The surface that layers lie on: unit vectors, the cosine between them and the alpha of its facets.
@@ -55,6 +82,9 @@ pub(super) struct Below {
     pub cos_view: f32,
     pub alpha: f32,
 }
+
+/// Views are not flatter.
+pub(super) const LEAST_COS_VIEW: f32 = 1.0e-4;
 
 /// The two numbers of a word.
 fn numbers_of(word: f32) -> [f32; 2] {
@@ -88,21 +118,31 @@ fn sheen_masking(cosine: f32, alpha: f32) -> f32 {
 
 impl Layers {
     /// The layers of a surface; `None`: it has none.
-    pub fn of(g: &GBuffer, m: &Material, below: &Below) -> Option<Self> {
-        if m.flags & MATERIAL_LAYERS == 0 {
+    pub fn of(g: &GBuffer, (m, x): (&Material, &More), below: &Below) -> Option<Self> {
+        if m.flags & (MATERIAL_LAYERS | MATERIAL_MORE) == 0 {
             return None;
         }
         let mut l = Self::default();
+        // Where it is turned away from the view, the coat has the normal of what is below.
+        let cos_view = dot(x.normal, below.view);
+        if m.flags & MATERIAL_MORE != 0 && cos_view > LEAST_COS_VIEW {
+            l.coat = Some(Frame { normal: x.normal, cos_view });
+        }
+        if m.flags & MATERIAL_LAYERS == 0 {
+            return Some(l);
+        }
         let step = 1.0 / LAYER_STEPS as f32;
         let [first, second, stretch, film, thickness] = [1, 3, 5, 7, 9].map(|row| numbers_of(m.uv_from_set[row][3]));
         let (first, second) = (first.map(|x| x * step), second.map(|x| x * step));
-        l.sheen = [first[0], first[1], second[0]];
+        let sheen = [first[0], first[1], second[0]];
+        l.sheen = each(|k| sheen[k] * x.sheen[k]);
         if most3(l.sheen) > 0.0 {
-            l.sheen_alpha = most(second[1] * second[1], LEAST_SHEEN_ALPHA as f32);
+            let roughness = second[1] * x.sheen_roughness;
+            l.sheen_alpha = most(roughness * roughness, LEAST_SHEEN_ALPHA as f32);
         }
         let n = below.normal;
         if stretch[0] > 0.0 {
-            l.strength = stretch[0] * step;
+            l.strength = stretch[0] * step * x.anisotropy;
             l.alpha_along = mix(below.alpha, 1.0, l.strength * l.strength);
             let along = dot(n, g.tangent);
             let beside = each(|k| g.tangent[k] - n[k] * along);
@@ -115,14 +155,18 @@ impl Layers {
             }
             let angle = TAU / (LAYER_STEPS + 1) as f32 * stretch[1];
             let (cosine, sine, b) = (angle.cos(), angle.sin(), cross(n, t));
-            l.along = normalize(each(|k| cosine * t[k] + sine * side * b[k]));
+            let length = (x.along[0] * x.along[0] + x.along[1] * x.along[1]).sqrt();
+            let a = if length > 1.0e-6 { x.along.map(|c| c / length) } else { [1.0, 0.0] };
+            let turned = [cosine * a[0] - sine * a[1], sine * a[0] + cosine * a[1]];
+            l.along = normalize(each(|k| turned[0] * t[k] + turned[1] * side * b[k]));
             l.across = cross(n, l.along);
         }
         // What rays pass straight through reflects for those that pass as well, and its film is left out.
         let passes = m.flags & MATERIAL_REFRACTS != 0 && g.state & GBUFFER_REFRACTS == 0;
         if !passes {
-            l.coverage = film[0] * step;
-            l.film = Film { index: 1.0 + film[1] / LAYER_INDEX_STEPS as f32, thickness: thickness[0] };
+            l.coverage = film[0] * step * x.film;
+            let thickness = mix(thickness[1], thickness[0], x.film_thickness);
+            l.film = Film { index: 1.0 + film[1] / LAYER_INDEX_STEPS as f32, thickness };
         }
         Some(l)
     }

@@ -1,10 +1,11 @@
 //! Sheen, anisotropy and films beside what KHR_materials_sheen, _anisotropy and _iridescence say, in f64.
 
 use super::gloss::Gloss;
-use crate::kernels::layout::{GBUFFER_REFRACTS, GBuffer};
+use super::more::{Shown, WHOLE};
+use crate::kernels::layout::{GBUFFER_REFRACTS, GBuffer, More};
 use crate::kernels::vector::{Vec3, cross, dot, normalize};
 use crate::math::sampling::random4;
-use bricks::{Layers, MATERIAL_REFRACTS, Material};
+use bricks::{Layers, MATERIAL_MORE, MATERIAL_REFRACTS, Material};
 use std::f64::consts::{PI, TAU};
 
 const NORMAL: Vec3 = [0.0, 0.0, 1.0];
@@ -39,6 +40,16 @@ fn gloss(m: &Material, albedo: Vec3, roughness: f32, cosine: f32, azimuth: f32) 
         ..GBuffer::default()
     };
     Gloss::of(&g, m, view)
+}
+
+/// A coated metal whose coat leans by an angle, seen from the coat's side or from the other.
+fn leaning(coat: f32, angle: f32, cosine: f32, azimuth: f32) -> Gloss {
+    let m = Material { clearcoat: coat, clearcoat_roughness: 0.4, flags: MATERIAL_MORE, ..metal() };
+    let level = (1.0 - cosine * cosine).sqrt();
+    let view = [level * azimuth.cos(), level * azimuth.sin(), cosine];
+    let g = GBuffer { albedo: [1.0; 3], normal: NORMAL, metallic: 1.0, roughness: 0.6, ..GBuffer::default() };
+    let x = More { normal: [angle.sin(), 0.0, angle.cos()], ..WHOLE };
+    Gloss::of(Shown::of(&[g], &[x], 0), &m, view)
 }
 
 /// The integral over the hemisphere, on a grid that is denser where light grazes.
@@ -337,7 +348,7 @@ fn films_gain_nothing() {
 }
 
 /// What directions are drawn by, over all kinds of layers at once.
-fn mixtures() -> [Gloss; 4] {
+fn mixtures() -> [Gloss; 6] {
     let all = Layers { sheen: [0.9, 0.6, 0.3], sheen_roughness: 0.4, anisotropy: 0.7, rotation: 0.1, ..BUBBLE };
     let coated = Material { clearcoat: 0.5, clearcoat_roughness: 0.3, ..plastic() };
     [
@@ -345,7 +356,31 @@ fn mixtures() -> [Gloss; 4] {
         gloss(&with(metal(), all), [0.9, 0.6, 0.3], 0.3, 0.3, 1.0),
         gloss(&with(Material::DIFFUSE, VELVET), [0.5; 3], 1.0, 0.4, 0.0),
         gloss(&with(metal(), Layers { anisotropy: 1.0, ..Layers::NONE }), [1.0; 3], 0.2, 0.5, 0.8),
+        leaning(1.0, 0.4, 0.7, 0.3),
+        leaning(0.6, 0.7, 0.5, 1.2),
     ]
+}
+
+/// A coat with a normal of its own reflects no more than all of the light, and what its normal says.
+#[test]
+fn coats_that_lean_gain_nothing() {
+    for angle in [0.0, 0.2, 0.5, 0.9] {
+        for (cosine, azimuth) in [(0.9, 0.0), (0.6, 1.0), (0.3, 3.1), (0.1, 0.0)] {
+            let s = leaning(1.0, angle, cosine, azimuth);
+            let sum = integrated(&s);
+            assert!(sum.iter().all(|x| (0.5..1.004).contains(x)), "{angle} {cosine} {azimuth}: {sum:?}");
+        }
+    }
+    // Where it mirrors the view it is brighter than where the surface below does.
+    let toward = |s: &Gloss, n: Vec3, view: Vec3| {
+        let along = 2.0 * dot(n, view);
+        s.reflected(std::array::from_fn(|k| along * n[k] - view[k]))[0]
+    };
+    let (view, normal) = ([0.0, 0.0, 1.0], [0.3f32.sin(), 0.0, 0.3f32.cos()]);
+    let straight = |angle: f32| leaning(1.0, angle, 1.0, 0.0);
+    let (flat, leaned) = (straight(0.0), straight(0.3));
+    assert!(toward(&leaned, normal, view) > 1.02 * toward(&flat, normal, view));
+    assert!(toward(&leaned, NORMAL, view) < 0.98 * toward(&flat, NORMAL, view));
 }
 
 /// The mean of what is reflected over the density, over drawn directions, is the integral.

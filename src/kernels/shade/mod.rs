@@ -12,6 +12,7 @@ mod layers;
 #[cfg(test)]
 mod layers_tests;
 pub mod light;
+pub mod more;
 pub mod paths;
 pub mod random;
 pub mod resolve;

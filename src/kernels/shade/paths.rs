@@ -4,6 +4,7 @@ use super::cones::{self, widen};
 use super::generate::{for_each_leaving, none};
 use super::gloss::{Drawn, Gloss, left_within};
 use super::lamps::unit;
+use super::more::Shown;
 use super::random::tangent;
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
@@ -63,14 +64,14 @@ struct Step {
 
 /// One ray from every hit of the shaded set, which a path goes on by; see the kernel.
 pub fn generate_path(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
-    let Pixels { gbuffers: [_, gbuffer], throughput, densities, .. } = pixels;
+    let Pixels { gbuffers: [_, gbuffer], mores: [_, mores], throughput, densities, .. } = pixels;
     let p = bound.params;
     let step = |index: usize, before: &[f32; 4]| -> Option<Step> {
         let surface = &seen.surfaces[index];
         if most(before[0], most(before[1], before[2])) <= 0.0 {
             return None;
         }
-        let g = &gbuffer[index];
+        let g = Shown::of(gbuffer, mores, index);
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
         let words = points4(bound.pixel_of(index) ^ pcg((before[3] as u32).wrapping_add(1)), p.stream, p.seed);
         let drawn = s.path_direction(g.normal, words);
@@ -89,7 +90,7 @@ pub fn generate_path(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mu
                 weight = each(|k| (s.diffuse[k] + reflected[k]) * share);
                 scale = 1.0;
             }
-            let left = left_within(bound, g, &materials[g.material as usize], seen.way(index));
+            let left = left_within(bound, &g, &materials[g.material as usize], seen.way(index));
             weight = each(|k| weight[k] * left[k]);
             let chance = if p.direction >= FIRST_CHANCE { least(most3(weight), MOST_LIKELY) } else { 1.0 };
             if unit(pcg(words[3])) < chance {

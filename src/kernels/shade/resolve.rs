@@ -4,10 +4,12 @@
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     GBUFFER_BACK, GBUFFER_FIRST, GBUFFER_READ, GBUFFER_REFRACTS, GBuffer, INSTANCE_MIRRORED, INSTANCE_STRETCHED,
-    MATERIAL_ANISOTROPIC, MATERIAL_REFRACTS, NO_NORMAL, NONE, PARAM_REFRACT, Params, Ray, STATE_ATTRIBUTES, Surface,
+    MATERIAL_ANISOTROPIC, MATERIAL_MORE, MATERIAL_REFRACTS, More, NO_NORMAL, NONE, PARAM_REFRACT, Params, Ray,
+    STATE_ATTRIBUTES, Surface,
 };
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
+use crate::kernels::shade::more;
 use crate::kernels::texture::sample::settle;
 use crate::kernels::vector::{Vec3, dot, each, most, most3, normalize, unpack4x8unorm, xyz};
 use crate::math::exact::{divide, square_root};
@@ -57,27 +59,45 @@ fn beside_passing(m: &Material) -> f32 {
     if passing < 1.0 { (1.0 - m.transmission) / (1.0 - passing) } else { 0.0 }
 }
 
-/// Of all hits of the shaded set that have none yet.
+/// Of all hits of the shaded set that have none yet. `mores`: of the same hits, or of none.
 pub fn resolve(
     bound: &Bound,
     seen: &RaySet,
-    gbuffer: &mut [GBuffer],
+    (gbuffer, mores): (&mut [GBuffer], &mut [More]),
     materials: &[Material],
     attributes: &[AttributeView],
 ) {
-    gbuffer.par_iter_mut().enumerate().with_min_len(256).for_each(|(index, g)| {
+    let resolved = |index: usize, g: &mut GBuffer, more: Option<&mut More>| {
         let surface = &seen.surfaces[index];
         if surface.leaf == NONE || g.state != 0 {
             return;
         }
         let brick = bound.brick_of(surface.leaf);
         if bound.slots[brick].state & STATE_ATTRIBUTES != 0 {
-            *g = read(bound, seen, index, materials, &attributes[brick]);
+            let of_hit;
+            (*g, of_hit) = read(bound, seen, index, materials, &attributes[brick]);
+            if let (Some(more), Some(of_hit)) = (more, of_hit) {
+                *more = of_hit;
+            }
         }
-    });
+    };
+    let gbuffer = gbuffer.par_iter_mut();
+    if mores.is_empty() {
+        gbuffer.enumerate().with_min_len(256).for_each(|(index, g)| resolved(index, g, None));
+    } else {
+        let all = gbuffer.zip(mores).enumerate().with_min_len(256);
+        all.for_each(|(index, (g, more))| resolved(index, g, Some(more)));
+    }
 }
 
-fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attributes: &AttributeView) -> GBuffer {
+/// What a hit shows, and its further textures where it has some.
+fn read(
+    bound: &Bound,
+    seen: &RaySet,
+    index: usize,
+    materials: &[Material],
+    attributes: &AttributeView,
+) -> (GBuffer, Option<More>) {
     let surface = &seen.surfaces[index];
     let word = attributes.surfaces[surface.triangle as usize];
     let material = &materials[(word & SURFACE_MATERIAL) as usize];
@@ -131,7 +151,7 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
             g.state |= 1 << (GBUFFER_FIRST + place);
         }
     }
-    if g.state != GBUFFER_READ || material.flags & MATERIAL_ANISOTROPIC != 0 {
+    if g.state != GBUFFER_READ || material.flags & (MATERIAL_ANISOTROPIC | MATERIAL_MORE) != 0 {
         let footprint = |uvs| footprint_of(bound.params, &seen.rays[index], hit.t, surface, uvs);
         g.footprint = footprint(corners.map(|v| v.uv));
         if let Some(details) = attributes.details(surface.triangle) {
@@ -161,6 +181,7 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
             g.state &= !(1 << (GBUFFER_FIRST + NORMAL as u32));
         }
     }
+    let more = more::start(&g, materials, n);
     if g.state == GBUFFER_READ {
         settle(&mut g, material.flags);
     }
@@ -175,5 +196,5 @@ fn read(bound: &Bound, seen: &RaySet, index: usize, materials: &[Material], attr
             g.albedo = g.albedo.map(|c| c * share);
         }
     }
-    g
+    (g, more)
 }

@@ -6,11 +6,12 @@ use super::lamps::{
     drawn_density, drawn_light, environment_density, environment_sample, lamp_words, outweighs, shines, sun_density,
 };
 use super::light::{add_light as add, ambient, background, sunlight};
+use super::more::Shown;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
     BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBUFFER_BACK, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT,
-    MET, NONE, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS, PARAM_PATH,
-    PARAM_SKY, PARAM_SUN, Ray,
+    MET, More, NONE, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS,
+    PARAM_PATH, PARAM_SKY, PARAM_SUN, Ray,
 };
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, most, normalize, xyz};
@@ -26,6 +27,8 @@ const RUN: usize = 1024;
 pub struct Pixels {
     /// Of the hits of sets 0 and 1.
     pub gbuffers: [Vec<GBuffer>; 2],
+    /// What their further textures show; empty in scenes without. The kernels keep it with the G-buffer.
+    pub mores: [Vec<More>; 2],
     /// Summed over the samples of a batch; w counts them.
     pub radiance: Vec<[f32; 4]>,
     /// Of the light that the rays of set 1 bring.
@@ -35,16 +38,23 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// Of `rays` pixels.
-    pub fn new(rays: usize) -> Self {
+    /// Of `rays` pixels; `has_more`: of a scene with further textures.
+    pub fn new(rays: usize, has_more: bool) -> Self {
         let gbuffers = [vec![GBuffer::default(); rays], Vec::new()];
-        Self { gbuffers, radiance: vec![[0.0; 4]; rays], throughput: Vec::new(), densities: Vec::new() }
+        let mores = [vec![More::default(); if has_more { rays } else { 0 }], Vec::new()];
+        Self { gbuffers, mores, radiance: vec![[0.0; 4]; rays], throughput: Vec::new(), densities: Vec::new() }
+    }
+
+    /// What is kept of the hits of a set.
+    pub fn of_set(&mut self, set: usize) -> (&mut [GBuffer], &mut [More]) {
+        (&mut self.gbuffers[set], &mut self.mores[set])
     }
 
     /// Makes room for bounces at every pixel.
     pub fn allow_bounces(&mut self) {
         let rays = self.radiance.len();
         self.gbuffers[1] = vec![GBuffer::default(); rays];
+        self.mores[1] = vec![More::default(); self.mores[0].len()];
         self.throughput = vec![[0.0; 4]; rays];
         self.densities = vec![0.0; rays];
     }
@@ -66,15 +76,15 @@ pub(crate) fn for_each_pixel(
     bound: &Bound,
     pixels: &mut Pixels,
     shaded: usize,
-    light: impl Fn(usize, &GBuffer, &mut [f32; 4], Carried) -> Option<Vec3> + Sync,
+    light: impl Fn(usize, Shown, &mut [f32; 4], Carried) -> Option<Vec3> + Sync,
 ) {
-    let Pixels { gbuffers, radiance, throughput, densities } = pixels;
-    let (gbuffer, carried) = (&gbuffers[shaded], (&throughput[..], &densities[..]));
+    let Pixels { gbuffers, mores, radiance, throughput, densities, .. } = pixels;
+    let (gbuffer, mores, carried) = (&gbuffers[shaded], &mores[shaded], (&throughput[..], &densities[..]));
     radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
         let mut tally = Tally::default();
         for (i, radiance) in radiance.iter_mut().enumerate() {
             let index = run * RUN + i;
-            if let Some(light) = light(index, &gbuffer[index], radiance, carried) {
+            if let Some(light) = light(index, Shown::of(gbuffer, mores, index), radiance, carried) {
                 add(bound, &mut tally, radiance, carried.0.get(index), light);
             }
         }
@@ -177,7 +187,7 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
             light = each(|k| light[k] + ambient[k] * g.occlusion);
             mirrored = each(|k| mirrored[k] + reflected[k] * g.occlusion);
         }
-        let emission = seen_emission(bound, g, m, seen, index, density);
+        let emission = seen_emission(bound, &g, m, seen, index, density);
         Some(each(|k| s.diffuse[k] * light[k] + mirrored[k] + emission[k]))
     });
 }

@@ -2,6 +2,8 @@
 
 pub mod bc5;
 pub mod bc7;
+pub mod look_up;
+pub mod more;
 pub mod sample;
 pub mod texels;
 // A twin's file has the name of its kernel.

@@ -1,6 +1,7 @@
 //! Texture lookups against the decoder of another library, naive bilinear lookups in f64, and heavily supersampled
 //! pictures.
 
+use super::look_up::Lookups;
 use super::sample::look_up;
 use super::texels::{Sampling, Texels, TileDemand};
 use super::texture::{Levels, color_at, level_at, levels_of, tile_at};
@@ -298,7 +299,8 @@ fn a_hit_waits_for_all_of_its_tiles() {
     let all: Vec<&[u32]> = whole.iter().map(|words| &words[..]).collect();
     let asked = |g: &mut GBuffer, tiles: &[&[u32]]| -> Vec<(usize, u32, u32, u32)> {
         let demand: Vec<TileDemand> = tiles.iter().map(|_| TileDemand::default()).collect();
-        look_up(g, 77, Sampling { texels: &texels, tiles }, &demand, false);
+        let from = Sampling { texels: &texels, tiles };
+        look_up(g, 77, &Lookups { from, demand: &demand, takes_coarser: false });
         let demand = demand.iter().map(TileDemand::get).enumerate();
         demand.filter(|(_, d)| d.rays + d.used > 0).map(|(i, d)| (i, d.rays, d.first, d.used)).collect()
     };
@@ -335,7 +337,7 @@ fn the_next_resident_level_stands_for_missing_tiles() {
         let from = Sampling { texels: &texels, tiles: held };
         let demand: Vec<TileDemand> = held.iter().map(|_| TileDemand::default()).collect();
         let mut g = waiting;
-        let is_coarser = look_up(&mut g, 77, from, &demand, true);
+        let is_coarser = look_up(&mut g, 77, &Lookups { from, demand: &demand, takes_coarser: true });
         let state = if is_coarser { GBUFFER_READ | GBUFFER_COARSER } else { GBUFFER_READ };
         assert!(g.state == state && demand.iter().all(|d| d.get().rays == 0), "no hit waits");
         let used = demand.iter().filter(|d| d.get().used > 0).count();

@@ -16,7 +16,7 @@ use crate::gpu::executor::GpuExecutor;
 use crate::kernels::denoise;
 use crate::kernels::dispatch::dispatches;
 use crate::kernels::layout::{
-    DenoiseSeen, DvfGrid, Entry, GBuffer, Hit, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList,
+    DenoiseSeen, DvfGrid, Entry, GBuffer, Hit, More, NONE, Params, Ray, RomaMap, RsmMap, RsmTexel, Surface, TileList,
 };
 use crate::kernels::table::Family;
 use crate::kernels::trace::levels::spread_of;
@@ -151,6 +151,18 @@ impl Findings {
         }
     }
 
+    fn mores(&mut self, context: &str, bound: f32, gpu: &[More], cpu: &[More]) {
+        let numbers = |x: &More| {
+            let shares = [x.specular_weight, x.sheen_roughness, x.coat, x.anisotropy];
+            let others = [x.coat_roughness, x.film, x.film_thickness];
+            [&x.specular[..], &x.sheen, &x.normal, &x.along, &shares, &others].concat()
+        };
+        for (g, c) in gpu.iter().zip(cpu) {
+            self.numbers("further textures", context, bound, &numbers(g), &numbers(c));
+            self.words("further textures that wait", context, &[g.state], &[c.state]);
+        }
+    }
+
     fn texels(&mut self, context: &str, bound: f32, gpu: &[RsmTexel], cpu: &[RsmTexel]) {
         let light = [gpu, cpu].map(|all| all.iter().flat_map(|texel| texel.flux).collect::<Vec<f32>>());
         self.numbers("light of shadow maps", context, bound, &light[0], &light[1]);
@@ -269,6 +281,9 @@ impl Lockstep {
         let gbuffer = self.gpu.read_gbuffer_of(set)?;
         self.findings.lock().expect("findings").gbuffers(context, self.bound, &gbuffer, self.cpu.gbuffer_of(set));
         *self.cpu.gbuffer_of(set) = gbuffer;
+        let more = self.gpu.read_more_of(set)?;
+        self.findings.lock().expect("findings").mores(context, self.bound, &more, self.cpu.more_of(set));
+        *self.cpu.more_of(set) = more;
         if self.defect == Some(Defect::Lookups) {
             self.cpu.gbuffer_of(set).iter_mut().for_each(|g| g.uv[0] += 0.25);
         }
@@ -364,6 +379,8 @@ impl Lockstep {
             let set = pass.set().saturating_sub(1);
             let gbuffer = (self.gpu.read_gbuffer_of(set)?, self.cpu.gbuffer_of(set));
             findings.gbuffers(context, self.bound, &gbuffer.0, gbuffer.1);
+            let more = (self.gpu.read_more_of(set)?, self.cpu.more_of(set));
+            findings.mores(context, self.bound, &more.0, more.1);
         }
         Ok(())
     }

@@ -6,6 +6,7 @@ use crate::kernels::rays::RaySet;
 use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::shade::lamps::{lamp_words, shines, unit};
 use crate::kernels::shade::light::{add_light, sunlight};
+use crate::kernels::shade::more::Shown;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::table::words;
 use crate::kernels::vector::{Vec3, dot, each, most};
@@ -60,7 +61,7 @@ fn seen_by_lamp(
     if surface.leaf == NONE {
         return RsmTexel { depth: -1.0, ..RsmTexel::default() };
     }
-    let g = &pixels.gbuffers[0][index];
+    let g = Shown::of(&pixels.gbuffers[0], &pixels.mores[0], index);
     let t = seen.hits[index].t;
     let to_lamp = seen.rays[index].direction.map(|x| -x);
     let light = if lamp == NONE {

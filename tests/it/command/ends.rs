@@ -22,7 +22,7 @@ fn a_picture_too_large_for_the_memory_is_refused_at_once() {
     let out = folder.path().join("out");
     let words = ["walk".as_ref(), scene.as_os_str(), "-o".as_ref(), out.as_os_str()];
     let options = "--frames 1 --size 16384x16384 --adapter cpu --aov --effects shadow,diffuse,glossy";
-    let PictureBytes { joined, .. } = PictureBytes::of(&crate::common::settings(options));
+    let PictureBytes { joined, .. } = PictureBytes::of(&crate::common::settings(options), false);
     if brickwalk::cpu::available_memory().is_none_or(|bytes| bytes >= joined << 28) {
         return skip("the memory of this machine holds the picture");
     }
@@ -73,7 +73,8 @@ fn pictures_take_as_much_memory_as_is_said() {
         };
         let (small, large) = (512, 1280);
         let found = (peak(large) - peak(small)) as f64 / (large * large - small * small) as f64;
-        let PictureBytes { device, filter, host, band, joined } = PictureBytes::of(&crate::common::settings(options));
+        let PictureBytes { device, filter, host, band, joined } =
+            PictureBytes::of(&crate::common::settings(options), false);
         // Bands of one row of tiles.
         let of_band = 64.0 * (device + band) as f64 / (large + small) as f64;
         let said = if options.contains("--bands") { joined as f64 + of_band } else { (device + filter + host) as f64 };

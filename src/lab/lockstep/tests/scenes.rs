@@ -20,7 +20,9 @@ pub fn textured(tiled: bool) -> Arc<SceneFile> {
         (state >> 40) as f64 / f64::from(1 << 24)
     };
     let mut primitive = |material: u32, count: u32| {
-        let mut part = Primitive { material, ..Primitive::default() };
+        // Further textures lie behind materials that have them.
+        let place = [0, 1, 3, 5][material as usize];
+        let mut part = Primitive { material: place, ..Primitive::default() };
         let (mut normals, mut uvs, mut colors) = (Vec::new(), Vec::new(), Vec::new());
         let (mut uvs1, mut tangents) = (Vec::new(), Vec::new());
         for corner in 0..3 * count {
@@ -99,9 +101,23 @@ pub fn textured(tiled: bool) -> Arc<SceneFile> {
             film: [0.0, 0.9, 0.5, 0.7][i as usize],
             film_index: 1.3 + 0.1 * i as f32,
             film_thickness: 200.0 * i as f32,
+            film_least: 50.0,
         });
+        material.flags |= if i > 0 { bricks::MATERIAL_MORE } else { 0 };
         material
     };
+    // Some wait for textures that the material has as well, some for tiles of their own.
+    let further = |i: u32| bricks::Material {
+        base_color_texture: [bricks::NONE, 2, bricks::NONE, bricks::NONE][i as usize],
+        normal_texture: [bricks::NONE, bricks::NONE, 1, 2][i as usize],
+        metallic_roughness_texture: [bricks::NONE, 0, 1, 2][i as usize],
+        occlusion_texture: [bricks::NONE, 2, 0, bricks::NONE][i as usize],
+        emissive_texture: [bricks::NONE, bricks::NONE, 1, bricks::NONE][i as usize],
+        normal_scale: 0.6,
+        uv_sets: [0, 4, 2, 8][i as usize],
+        ..bricks::Material::further()
+    };
+    let with_further = |i: u32| [material(i)].into_iter().chain((i > 0).then(|| further(i)));
     let mesh = |name: &str, primitives| Mesh { name: name.into(), primitives };
     let place = |mesh, world_from_mesh| Placement {
         name: "p".into(),
@@ -120,7 +136,7 @@ pub fn textured(tiled: bool) -> Arc<SceneFile> {
             place(1, [0.75, 0.0, 1.0, 0.75, 0.0, 1.25, 0.0, 0.5, -1.0, 0.0, 0.75, -0.25]),
             place(1, [-0.5, 0.0, 0.0, -1.0, 0.0, 0.8, 0.1, 0.25, 0.2, 0.0, 0.7, 1.0]),
         ],
-        materials: (0..4).map(material).collect(),
+        materials: (0..4).flat_map(with_further).collect(),
         textures: (0..3).map(texture).collect(),
         sources: vec![bricks::Source { name: "t".into(), bytes: 0, hash: "2d06800538d394c2".into() }],
         ..SourceScene::default()

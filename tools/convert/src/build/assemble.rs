@@ -11,8 +11,8 @@ use super::tree::top_level::{self, TopLevel, world_box};
 use super::triangles::lattice::{Lattice, pow2};
 use crate::source::Outline;
 use bricks::{
-    BRICK_WIDE, Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Leaf, Level, MATERIAL_BLEND, MATERIAL_MASK,
-    Manifest, Material, NONE, Node, Object, Resident,
+    BRICK_WIDE, Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Leaf, Level, MATERIAL_BLEND, MATERIAL_FURTHER,
+    MATERIAL_MASK, Manifest, Material, NONE, Node, Object, Resident,
 };
 use rayon::prelude::*;
 use std::time::Duration;
@@ -169,10 +169,11 @@ pub(super) fn manifest(
     let is_used = |index: usize| used_materials[index / 64] >> (index % 64) & 1 != 0;
     let any = |test: &dyn Fn(&Material) -> bool| {
         // What is added for levels has nothing that the others do not have.
-        resident.materials[..scene.materials.len()]
-            .iter()
-            .enumerate()
-            .any(|(index, material)| is_used(index) && test(material))
+        resident.materials[..scene.materials.len()].iter().enumerate().any(|(index, material)| {
+            // Further textures are used with the material before them.
+            let behind = usize::from(material.flags & MATERIAL_FURTHER != 0);
+            is_used(index.saturating_sub(behind)) && test(material)
+        })
     };
     let instanced = resident.instances.iter().map(|instance| &resident.objects[instance.object as usize]);
     Manifest {

@@ -34,6 +34,35 @@ pub(super) fn decode_texture(bytes: &Bytes, name: String, wrap: u32) -> Result<S
     Ok(SourceTexture { name, width, height, wrap, rgba })
 }
 
+/// One image of channels of several, each the number of an image and the channel of that; white where there is none. It
+/// has the size of the largest; the others are interpolated.
+pub(super) fn pack(
+    images: Vec<SourceTexture>,
+    channels: [Option<(usize, usize)>; 4],
+    name: String,
+    wrap: u32,
+) -> SourceTexture {
+    let width = images.iter().map(|image| image.width).max().unwrap_or(1);
+    let height = images.iter().map(|image| image.height).max().unwrap_or(1);
+    let resized = |image: SourceTexture| {
+        if (image.width, image.height) == (width, height) {
+            return Some(image.rgba);
+        }
+        let image = image::RgbaImage::from_raw(image.width, image.height, image.rgba)?;
+        Some(image::imageops::resize(&image, width, height, image::imageops::FilterType::Triangle).into_raw())
+    };
+    let images: Vec<_> = images.into_iter().map(resized).collect();
+    let mut rgba = vec![255; 4 * width as usize * height as usize];
+    for (to, channel) in channels.into_iter().enumerate() {
+        let Some((image, from)) = channel else { continue };
+        let Some(Some(texels)) = images.get(image) else { continue };
+        for (out, texel) in rgba.iter_mut().skip(to).step_by(4).zip(texels.iter().skip(from).step_by(4)) {
+            *out = *texel;
+        }
+    }
+    SourceTexture { name, width, height, wrap, rgba }
+}
+
 /// Texels of an image: width, height, RGBA8.
 type Texels = (u32, u32, Vec<u8>);
 

@@ -5,7 +5,7 @@ use crate::build::error::BuildError;
 use crate::build::settings::BuildSettings;
 use crate::pattern::names;
 use crate::source::{IDENTITY, MeshOutline, Outline, Placement, Primitive};
-use bricks::Provenance;
+use bricks::{MATERIAL_FURTHER, MATERIAL_MORE, Provenance};
 
 /// Ratio of scales above which a matrix is not inverted: error bounds of rays in the object's space grow with it.
 const LARGEST_SCALE_RATIO: f64 = (1u64 << 20) as f64;
@@ -313,6 +313,9 @@ pub(crate) fn rule(ok: bool, what: String, found: usize, expected: String) -> Re
     if ok { Ok(()) } else { Err(BuildError::Inconsistent { what, found: found.to_string(), expected }) }
 }
 
+/// What [`check`] wants.
+const FURTHER: &str = "further textures behind each material that says so, and nowhere else";
+
 /// Checks that everything that is referred to exists.
 pub(crate) fn check(scene: &Outline) -> Result<(), BuildError> {
     for placement in &scene.placements {
@@ -321,12 +324,18 @@ pub(crate) fn check(scene: &Outline) -> Result<(), BuildError> {
         let (source, sources) = (placement.source as usize, scene.sources.len());
         rule(source < sources, format!("node \"{}\": source", placement.name), source, format!("less than {sources}"))?;
     }
+    let mut has_more = false;
     for (index, material) in scene.materials.iter().enumerate() {
         let textures = scene.textures.len();
+        let is_further = material.flags & MATERIAL_FURTHER != 0;
+        let flags = material.flags as usize;
+        rule(is_further == has_more, format!("material {index}: flags"), flags, FURTHER.to_owned())?;
+        has_more = material.flags & MATERIAL_MORE != 0;
         for texture in material.textures() {
             let known = texture == bricks::NONE || (texture as usize) < textures;
             rule(known, format!("material {index}: texture"), texture as usize, format!("less than {textures}"))?;
         }
     }
-    Ok(())
+    let count = scene.materials.len();
+    rule(!has_more, "materials".into(), count, FURTHER.to_owned())
 }

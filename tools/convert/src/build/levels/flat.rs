@@ -5,7 +5,7 @@ use crate::build::texture::mips::Textures;
 use crate::build::texture::opacity::MaterialOpacity;
 use crate::build::texture::small::Small;
 use crate::build::triangles::attributes::{MeanColors, Wants};
-use bricks::{BASE_COLOR, MATERIAL_BLEND, MATERIAL_MASK, Material, NONE};
+use bricks::{BASE_COLOR, MATERIAL_BLEND, MATERIAL_MASK, MATERIAL_MORE, Material, NONE};
 
 /// Where a texture is looked up under a triangle, as weights of its corners.
 const SAMPLES: [[f64; 3]; 4] = {
@@ -170,7 +170,7 @@ impl<'a> Flattened<'a> {
 
 /// A material without textures, of the same mean colours, through which no ray passes.
 fn flattened(material: &Material, mean: &MeanColors, texture_means: &[[f32; 3]]) -> Material {
-    let is_flat = material.textures().iter().all(|&texture| texture == NONE);
+    let is_flat = material.flags & MATERIAL_MORE == 0 && material.textures().iter().all(|&texture| texture == NONE);
     let is_opaque = material.flags & (MATERIAL_MASK | MATERIAL_BLEND) == 0;
     if is_flat && is_opaque {
         return *material;
@@ -185,7 +185,7 @@ fn flattened(material: &Material, mean: &MeanColors, texture_means: &[[f32; 3]])
         emission: mean.emission,
         metallic: material.metallic * metal,
         roughness: material.roughness * rough,
-        flags: material.flags & !(MATERIAL_MASK | MATERIAL_BLEND),
+        flags: material.flags & !(MATERIAL_MASK | MATERIAL_BLEND | MATERIAL_MORE),
         opacity_map: NONE,
         alpha_cutoff: Material::DIFFUSE.alpha_cutoff,
         uv_sets: 0,
@@ -193,5 +193,7 @@ fn flattened(material: &Material, mean: &MeanColors, texture_means: &[[f32; 3]])
         ..*material
     };
     flat.textures_mut().into_iter().for_each(|texture| *texture = NONE);
+    // Their words are those of its coordinates.
+    flat.set_layers(&material.layers());
     flat
 }

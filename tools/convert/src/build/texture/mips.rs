@@ -11,7 +11,7 @@ use crate::source::{Outline, Source, SourceTexture};
 use block_compression::encode::compress_rgba8;
 use block_compression::{BC7Settings, CompressionVariant};
 use bricks::{BLOCK_TEXELS, MATERIAL_TEXTURES, MAX_TEXTURE_SIZE, Material, NONE, Span, TILE_TEXELS, Texture, Writer};
-use bricks::{TEXTURE_BC5, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
+use bricks::{MATERIAL_FURTHER, TEXTURE_BC5, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
@@ -38,22 +38,26 @@ pub(crate) enum Content {
     Color,
     /// Numbers. Coarser levels average them; alpha is not kept.
     Data,
+    /// Numbers, alpha one of them.
+    Numbers,
     /// Directions. Texels of coarser levels are the directions of the means of those of the finest; alpha is not kept.
     Normals,
 }
 
 impl Content {
     /// Of the textures of a material, by their places.
-    const OF: [Content; MATERIAL_TEXTURES] =
-        [Content::Color, Content::Normals, Content::Data, Content::Data, Content::Color];
+    fn of(material: &Material) -> [Content; MATERIAL_TEXTURES] {
+        let third = if material.flags & MATERIAL_FURTHER != 0 { Content::Numbers } else { Content::Data };
+        [Content::Color, Content::Normals, third, Content::Data, Content::Color]
+    }
 
     /// How many there are.
-    const COUNT: usize = 3;
+    const COUNT: usize = 4;
 }
 
 /// Which textures some material uses, and for what, ascending. One that is used in two ways is stored twice.
 pub(crate) fn used(materials: &[Material]) -> Vec<(u32, Content)> {
-    let textures = materials.iter().flat_map(|material| material.textures().into_iter().zip(Content::OF));
+    let textures = materials.iter().flat_map(|material| material.textures().into_iter().zip(Content::of(material)));
     let used: BTreeSet<_> = textures.filter(|(texture, _)| *texture != NONE).collect();
     used.into_iter().collect()
 }
@@ -149,7 +153,8 @@ impl Textures {
         let renumber = |material: &Material| {
             let mut material = *material;
             let mut sets = material.uv_sets;
-            for (number, (texture, content)) in material.textures_mut().into_iter().zip(Content::OF).enumerate() {
+            let contents = Content::of(&material);
+            for (number, (texture, content)) in material.textures_mut().into_iter().zip(contents).enumerate() {
                 if *texture != NONE {
                     *texture = self.new_of_old[place(*texture, content)];
                 }
@@ -268,7 +273,7 @@ pub(crate) fn encode(
 
     let levels = width.max(height).ilog2() + 1;
     let mut texels = source.rgba.clone();
-    if content != Content::Color {
+    if matches!(content, Content::Data | Content::Normals) {
         texels.iter_mut().skip(3).step_by(4).for_each(|alpha| *alpha = 255);
     }
     let (encoding, grid) = match encoding {
@@ -459,7 +464,7 @@ impl Content {
             Self::Color => texels
                 .map(|&[r, g, b, a]| [table[r as usize], table[g as usize], table[b as usize], unorm(a)])
                 .collect(),
-            Self::Data | Self::Normals => texels.map(|texel| texel.map(unorm)).collect(),
+            Self::Data | Self::Numbers | Self::Normals => texels.map(|texel| texel.map(unorm)).collect(),
         }
     }
 
@@ -469,7 +474,7 @@ impl Content {
         let texels = level.texels.iter();
         match self {
             Self::Color => out.extend(texels.flat_map(|&[r, g, b, a]| [srgb(r), srgb(g), srgb(b), byte(a)])),
-            Self::Data => out.extend(texels.flat_map(|texel| texel.map(byte))),
+            Self::Data | Self::Numbers => out.extend(texels.flat_map(|texel| texel.map(byte))),
             Self::Normals => out.extend(texels.flat_map(|&[r, g, b, _]| {
                 let [x, y, z] = direction([r, g, b]).map(|c| byte(0.5 * c + 0.5));
                 [x, y, z, 255]
@@ -550,16 +555,19 @@ mod tests {
     #[test]
     fn unused_textures_are_left_out() {
         let material = |texture| Material { base_color_texture: texture, ..Material::DIFFUSE };
-        let mut materials = [material(3), material(NONE), material(1), material(3), material(2)];
+        // The third texture of further ones has four numbers.
+        let further = Material { metallic_roughness_texture: 4, ..Material::further() };
+        let mut materials = [material(3), material(NONE), material(1), material(3), material(2), further];
         // A texture of two kinds, and two uses of one kind.
         (materials[0].normal_texture, materials[1].occlusion_texture) = (1, 4);
         (materials[1].metallic_roughness_texture, materials[2].emissive_texture) = (4, 3);
         materials.iter_mut().for_each(|material| material.uv_sets = 0b1_1111);
-        use Content::{Color, Data, Normals};
-        assert_eq!(used(&materials), [(1, Color), (1, Normals), (2, Color), (3, Color), (4, Data)]);
-        let mut stored = Textures { new_of_old: vec![NONE; 15], ..Textures::default() };
+        use Content::{Color, Data, Normals, Numbers};
+        let all = [(1, Color), (1, Normals), (2, Color), (3, Color), (4, Data), (4, Numbers)];
+        assert_eq!(used(&materials), all);
+        let mut stored = Textures { new_of_old: vec![NONE; 5 * Content::COUNT], ..Textures::default() };
         // Texture 2 could not be read.
-        for (new, (old, content)) in (0..).zip([(1, Color), (1, Normals), (3, Color), (4, Data)]) {
+        for (new, (old, content)) in (0..).zip([(1, Color), (1, Normals), (3, Color), (4, Data), (4, Numbers)]) {
             stored.new_of_old[place(old, content)] = new;
         }
         let renumbered = stored.renumber(&materials);
@@ -567,9 +575,9 @@ mod tests {
         assert_eq!(indices[0], [2, 1, NONE, NONE, NONE]);
         assert_eq!(indices[1], [NONE, NONE, 3, 3, NONE]);
         assert_eq!(indices[2], [0, NONE, NONE, NONE, 2]);
-        assert_eq!(indices[3..], [[2, NONE, NONE, NONE, NONE], [NONE; 5]]);
+        assert_eq!(indices[3..], [[2, NONE, NONE, NONE, NONE], [NONE; 5], [NONE, NONE, 4, NONE, NONE]]);
         let sets: Vec<u32> = renumbered.iter().map(|material| material.uv_sets).collect();
-        assert_eq!(sets, [0b11, 0b1100, 0b1_0001, 1, 0], "sets of textures alone");
+        assert_eq!(sets, [0b11, 0b1100, 0b1_0001, 1, 0, 0b100], "sets of textures alone");
     }
 
     const BC7: fn() -> CompressionVariant = || CompressionVariant::BC7(BC7Settings::opaque_ultra_fast());

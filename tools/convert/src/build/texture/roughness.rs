@@ -10,7 +10,7 @@
 //! are. The finest level is kept. A factor below 1 bounds what the texture can say, and [`MOST_SPREAD`] what is added:
 //! facets far from the highlight would come out too bright by it (`docs/results/textures.md`).
 
-use bricks::{METALLIC_ROUGHNESS, Material, NONE, NORMAL};
+use bricks::{MATERIAL_FURTHER, METALLIC_ROUGHNESS, Material, NONE, NORMAL};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Most that bumps add to α², for the reason that Tokuyoshi and Kaplanyan ("Improved Geometric Specular Antialiasing",
@@ -31,7 +31,8 @@ pub(crate) struct Bumps {
 /// The bumps of roughness textures, by their index in the source, where all materials that use one agree.
 pub(crate) fn bumps(materials: &[Material]) -> BTreeMap<u32, Bumps> {
     let mut users: BTreeMap<u32, BTreeSet<[u32; 3]>> = BTreeMap::new();
-    for m in materials.iter().filter(|m| m.metallic_roughness_texture != NONE) {
+    let is_rough = |m: &&Material| m.metallic_roughness_texture != NONE && m.flags & MATERIAL_FURTHER == 0;
+    for m in materials.iter().filter(is_rough) {
         let rows = |which: usize| &m.uv_from_set[2 * which..2 * which + 2];
         let set = |which: usize| m.uv_sets >> which & 1;
         let is_alike = rows(NORMAL) == rows(METALLIC_ROUGHNESS) && set(NORMAL) == set(METALLIC_ROUGHNESS);

@@ -358,6 +358,9 @@ pub(super) struct TextureInfo {
     pub index: Index<json::Texture>,
     #[serde(default)]
     pub tex_coord: u32,
+    /// Of the normals of a clear coat.
+    #[serde(default)]
+    pub scale: Option<f64>,
     #[serde(default)]
     pub extensions: TextureInfoExtensions,
 }
@@ -412,38 +415,39 @@ optional! {
     /// KHR_materials_specular.
     Specular {
         specular_factor: f64,
-        specular_texture: IgnoredAny,
+        specular_texture: TextureInfo,
         specular_color_factor: [f64; 3],
-        specular_color_texture: IgnoredAny,
+        specular_color_texture: TextureInfo,
     }
     /// KHR_materials_clearcoat.
     Clearcoat {
         clearcoat_factor: f64,
-        clearcoat_texture: IgnoredAny,
+        clearcoat_texture: TextureInfo,
         clearcoat_roughness_factor: f64,
-        clearcoat_roughness_texture: IgnoredAny,
-        clearcoat_normal_texture: IgnoredAny,
+        clearcoat_roughness_texture: TextureInfo,
+        clearcoat_normal_texture: TextureInfo,
     }
     /// KHR_materials_sheen.
     Sheen {
         sheen_color_factor: [f64; 3],
-        sheen_color_texture: IgnoredAny,
+        sheen_color_texture: TextureInfo,
         sheen_roughness_factor: f64,
-        sheen_roughness_texture: IgnoredAny,
+        sheen_roughness_texture: TextureInfo,
     }
     /// KHR_materials_anisotropy.
     Anisotropy {
         anisotropy_strength: f64,
         anisotropy_rotation: f64,
-        anisotropy_texture: IgnoredAny,
+        anisotropy_texture: TextureInfo,
     }
     /// KHR_materials_iridescence.
     Iridescence {
         iridescence_factor: f64,
-        iridescence_texture: IgnoredAny,
+        iridescence_texture: TextureInfo,
         iridescence_ior: f64,
+        iridescence_thickness_minimum: f64,
         iridescence_thickness_maximum: f64,
-        iridescence_thickness_texture: IgnoredAny,
+        iridescence_thickness_texture: TextureInfo,
     }
     /// KHR_materials_transmission.
     Transmission {

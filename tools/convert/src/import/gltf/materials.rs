@@ -6,11 +6,12 @@
 
 use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform, Volume};
 use super::file::{File, Problem, item};
+use super::further::{self, Pack};
 use super::names::label;
 use crate::import::warnings::Warnings;
 use bricks::{
-    Layers, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_REFRACTS, MATERIAL_TEXTURES, MATERIAL_UNLIT,
-    Material, NORMAL, pack_absorption,
+    Layers, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_MORE, MATERIAL_REFRACTS, MATERIAL_TEXTURES,
+    MATERIAL_UNLIT, Material, NONE, NORMAL, pack_absorption,
 };
 use bricks::{WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT};
 use gltf::json::material::AlphaMode;
@@ -25,13 +26,47 @@ const SETS: u32 = 2;
 /// Greatest index of refraction of a body; what none has.
 const MOST_INDEX: f64 = 100.0;
 
-/// An image with the way it is repeated.
+/// An image and, in order, those to fall back to when it cannot be used; in range.
+pub(super) type Images = Vec<usize>;
+
+/// What a texture shows.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Picture {
+    /// An image.
+    Whole(Images),
+    /// Of each channel an image and the channel of that; white where there is none. At least one is there.
+    Packed([Option<(Images, usize)>; 4]),
+}
+
+/// A picture with the way it is repeated.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Texture {
-    /// The image and, in order, those to fall back to when it cannot be used; in range.
-    pub images: Vec<usize>,
+    pub picture: Picture,
     /// `bricks::WRAP_*` of s in the low half, of t in the high half.
     pub wrap: u32,
+}
+
+impl Texture {
+    /// The image that names it.
+    pub fn image(&self) -> usize {
+        let images = match &self.picture {
+            Picture::Whole(images) => Some(images),
+            Picture::Packed(channels) => channels.iter().flatten().map(|(images, _)| images).next(),
+        };
+        images.and_then(|images| images.first()).copied().unwrap_or_default()
+    }
+}
+
+/// Materials and the textures of those in use.
+#[derive(Debug, Default)]
+pub(super) struct Materials {
+    /// Every material of the file in order, further textures behind those that have them.
+    pub records: Vec<Material>,
+    /// Where each material of the file is among them.
+    pub places: Vec<u32>,
+    /// In order of first use.
+    pub textures: Vec<Texture>,
+    known: BTreeMap<Texture, u32>,
 }
 
 /// The coordinates that the textures of a material are looked up at.
@@ -39,7 +74,8 @@ pub(super) struct Texture {
 pub(super) struct Coordinates {
     /// Whether each set is used.
     pub sets: [bool; SETS as usize],
-    /// Set and rows of the normal texture; without one, but with anisotropy, those of the first set as they are.
+    /// Set and rows of the normal texture, or of that of a coat, or of that of an anisotropy; without one, but with
+    /// anisotropy, those of the first set as they are.
     pub normal: Option<(usize, [[f32; 4]; 2])>,
     /// Whether its reflection has a direction along the surface.
     pub is_anisotropic: bool,
@@ -55,6 +91,11 @@ impl Coordinates {
             if place == NORMAL {
                 coordinates.normal = Some((set, rows(info).unwrap_or(SAME)));
             }
+        }
+        further::infos(material).filter_map(set).for_each(|set| coordinates.sets[set] = true);
+        if coordinates.normal.is_none() {
+            let directed = further::directed(material).and_then(|info| Some((info, set(info)?)));
+            coordinates.normal = directed.map(|(info, set)| (set, rows(info).unwrap_or(SAME)));
         }
         let anisotropy = material.more.extensions.anisotropy.as_ref();
         coordinates.is_anisotropic =
@@ -107,12 +148,10 @@ pub(super) fn default_material() -> Material {
 /// What a dielectric of index 1.5 reflects along the normal.
 const DIELECTRIC: f64 = 0.04;
 
-/// Every material of the file, in order, and the textures of those that `is_used` marks, in order of first use.
-pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (Vec<Material>, Vec<Texture>) {
+/// Every material of the file, and the textures of those that `is_used` marks.
+pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> Materials {
     let document = &file.document;
-    let mut materials = Vec::with_capacity(document.materials.len() + 1);
-    let mut textures = Vec::new();
-    let mut known = BTreeMap::new();
+    let mut materials = Materials::default();
     for (index, Lenient(json)) in document.materials.iter().enumerate() {
         let json = match json {
             Ok(json) => json,
@@ -122,39 +161,96 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> (V
                 continue;
             }
         };
+        let is_used = is_used[index];
         let place = || label("material", index, json.more.name.as_deref());
         let mut material = convert(json, warnings, &place);
         for (number, info) in infos(json).into_iter().enumerate() {
             let Some(info) = info else { continue };
-            let found = match texture(document, info.index, warnings, &place) {
-                Ok(texture) => texture,
-                Err(problem) => {
-                    warnings.add("unusable texture; white used instead", || format!("{} ({})", place(), problem.what));
-                    continue;
-                }
-            };
-            if !is_used[index] {
-                continue;
-            }
-            let Some(set) = set(info) else {
-                warnings.add("uses a third set of texture coordinates or a later one; texture ignored", place);
-                continue;
-            };
-            *material.textures_mut()[number] = *known.entry(found).or_insert_with_key(|texture| {
-                textures.push(texture.clone());
-                textures.len() as u32 - 1
-            });
-            material.uv_sets |= (set as u32) << number;
-            match rows(info) {
-                Some(rows) => material.uv_from_set[2 * number..2 * number + 2].copy_from_slice(&rows),
-                None => warnings.add("texture transform out of range; ignored", place),
+            let Some((images, wrap)) = images(document, info.index, warnings, &place) else { continue };
+            if is_used {
+                let texture = Texture { picture: Picture::Whole(images), wrap };
+                materials.put((&mut material, number), texture, info, warnings, &place);
             }
         }
         let layers = layers(json, &material, warnings, &place);
         material.set_layers(&layers);
+        let mut more = Material::further();
+        if let Some(scale) = further::normal_scale(json) {
+            more.normal_scale = scale;
+        }
+        let packs = further::packs(json, &material, &layers);
+        for (number, pack) in packs.into_iter().enumerate() {
+            if let Some((texture, info)) = packed(document, pack, warnings, &place).filter(|_| is_used) {
+                materials.put((&mut more, number), texture, info, warnings, &place);
+            }
+        }
+        let has_more = more.textures() != [NONE; MATERIAL_TEXTURES] || further::coat_differs(json, &material);
+        if has_more && is_used {
+            material.flags |= MATERIAL_MORE;
+        }
         materials.push(material);
+        if has_more && is_used {
+            materials.records.push(more);
+        }
     }
-    (materials, textures)
+    materials
+}
+
+impl Materials {
+    /// Appends a material of the file.
+    fn push(&mut self, material: Material) {
+        self.places.push(self.records.len() as u32);
+        self.records.push(material);
+    }
+
+    /// Gives a material a texture, looked up as `info` says.
+    fn put(
+        &mut self,
+        (material, number): (&mut Material, usize),
+        texture: Texture,
+        info: &TextureInfo,
+        warnings: &mut Warnings,
+        place: &dyn Fn() -> String,
+    ) {
+        let Some(set) = set(info) else {
+            warnings.add("uses a third set of texture coordinates or a later one; texture ignored", place);
+            return;
+        };
+        *material.textures_mut()[number] = *self.known.entry(texture).or_insert_with_key(|texture| {
+            self.textures.push(texture.clone());
+            self.textures.len() as u32 - 1
+        });
+        material.uv_sets |= (set as u32) << number;
+        match rows(info) {
+            Some(rows) => material.uv_from_set[2 * number..2 * number + 2].copy_from_slice(&rows),
+            None => warnings.add("texture transform out of range; ignored", place),
+        }
+    }
+}
+
+/// A pack of channels that agree in their coordinates with the first; those that do not are left out. `None`: nothing
+/// of it can be used.
+fn packed<'a>(
+    document: &Document,
+    pack: Pack<'a>,
+    warnings: &mut Warnings,
+    place: &dyn Fn() -> String,
+) -> Option<(Texture, &'a TextureInfo)> {
+    let mut channels = [const { None }; 4];
+    let mut first = None;
+    for (channel, given) in channels.iter_mut().zip(pack) {
+        let Some((info, from)) = given else { continue };
+        let Some((images, wrap)) = images(document, info.index, warnings, place) else { continue };
+        let looks = (set(info), rows(info), wrap);
+        let (_, expected) = first.get_or_insert((info, looks));
+        if *expected == looks {
+            *channel = Some((images, from));
+        } else {
+            warnings.add("textures of one layer take different coordinates; the first used", place);
+        }
+    }
+    let (info, (_, _, wrap)) = first?;
+    Some((Texture { picture: Picture::Packed(channels), wrap }, info))
 }
 
 /// The factors and flags of a material.
@@ -193,7 +289,7 @@ fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> 
         material.occlusion_strength = unit(texture.strength.0.into());
     }
     reflect(json, &mut material, warnings, place);
-    coat(json, &mut material, warnings, place);
+    coat(json, &mut material);
     transmit(json, &mut material, warnings, place);
     material
 }
@@ -229,24 +325,16 @@ fn reflect(json: &Json, material: &mut Material, warnings: &mut Warnings, place:
     if let Some(extension) = &extensions.specular {
         color = extension.specular_color_factor.unwrap_or([1.0; 3]);
         weight = extension.specular_factor.unwrap_or(1.0).clamp(0.0, 1.0);
-        if extension.specular_texture.is_some() || extension.specular_color_texture.is_some() {
-            warnings.add("KHR_materials_specular textures ignored; factors used", place);
-        }
     }
     material.specular = color.map(|c| unit((along_normal * c).clamp(0.0, 1.0) * weight));
     material.specular_weight = unit(weight);
 }
 
 /// KHR_materials_clearcoat.
-fn coat(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
+fn coat(json: &Json, material: &mut Material) {
     let Some(extension) = &json.more.extensions.clearcoat else { return };
     material.clearcoat = unit(extension.clearcoat_factor.unwrap_or(0.0));
     material.clearcoat_roughness = unit(extension.clearcoat_roughness_factor.unwrap_or(0.0));
-    let textures =
-        [&extension.clearcoat_texture, &extension.clearcoat_roughness_texture, &extension.clearcoat_normal_texture];
-    if material.clearcoat > 0.0 && textures.into_iter().any(Option::is_some) {
-        warnings.add("clear-coat textures ignored; factors used", place);
-    }
 }
 
 /// KHR_materials_sheen, _anisotropy and _iridescence.
@@ -256,17 +344,11 @@ fn layers(json: &Json, material: &Material, warnings: &mut Warnings, place: &dyn
     if let Some(sheen) = &extensions.sheen {
         layers.sheen = sheen.sheen_color_factor.unwrap_or([0.0; 3]).map(unit);
         layers.sheen_roughness = unit(sheen.sheen_roughness_factor.unwrap_or(0.0));
-        if sheen.sheen_color_texture.is_some() || sheen.sheen_roughness_texture.is_some() {
-            warnings.add("sheen textures ignored; factors used", place);
-        }
     }
     if let Some(anisotropy) = &extensions.anisotropy {
         layers.anisotropy = unit(anisotropy.anisotropy_strength.unwrap_or(0.0));
         let turns = anisotropy.anisotropy_rotation.unwrap_or(0.0) / std::f64::consts::TAU;
         layers.rotation = if turns.is_finite() { (turns - turns.floor()) as f32 } else { 0.0 };
-        if anisotropy.anisotropy_texture.is_some() {
-            warnings.add("anisotropy textures ignored; factors used", place);
-        }
     }
     if let Some(film) = extensions.iridescence.as_ref().filter(|film| film.iridescence_factor.is_some_and(|f| f > 0.0))
     {
@@ -278,9 +360,10 @@ fn layers(json: &Json, material: &Material, warnings: &mut Warnings, place: &dyn
         }
         layers.film = unit(film.iridescence_factor.unwrap_or(0.0));
         layers.film_index = film.iridescence_ior.unwrap_or(1.3).clamp(1.0, MOST_INDEX) as f32;
-        layers.film_thickness = film.iridescence_thickness_maximum.unwrap_or(400.0).clamp(0.0, 1e6) as f32;
-        if film.iridescence_texture.is_some() || film.iridescence_thickness_texture.is_some() {
-            warnings.add("iridescence textures ignored; factor and greatest thickness used", place);
+        let nanometers = |x: Option<f64>, default: f64| x.unwrap_or(default).clamp(0.0, 1e6) as f32;
+        layers.film_thickness = nanometers(film.iridescence_thickness_maximum, 400.0);
+        if film.iridescence_thickness_texture.is_some() {
+            layers.film_least = nanometers(film.iridescence_thickness_minimum, 100.0);
         }
     }
     layers
@@ -360,13 +443,28 @@ fn refract(volume: &Volume, json: &Json, material: &mut Material, warnings: &mut
     material.flags |= MATERIAL_REFRACTS;
 }
 
-/// Images and wrap modes of a texture.
+/// Images and wrap modes of a texture. `None`: it cannot be used, which is warned of.
+fn images(
+    document: &Document,
+    index: Index<json::Texture>,
+    warnings: &mut Warnings,
+    place: &dyn Fn() -> String,
+) -> Option<(Images, u32)> {
+    match texture(document, index, warnings, place) {
+        Ok(found) => Some(found),
+        Err(problem) => {
+            warnings.add("unusable texture; white used instead", || format!("{} ({})", place(), problem.what));
+            None
+        }
+    }
+}
+
 fn texture(
     document: &Document,
     index: Index<json::Texture>,
     warnings: &mut Warnings,
     place: &dyn Fn() -> String,
-) -> Result<Texture, Problem> {
+) -> Result<(Images, u32), Problem> {
     let malformed = |problem: &String| Problem::new(format!("texture {index}: {problem}"));
     let texture = item(&document.textures, index, "texture")?.0.as_ref().map_err(malformed)?;
     let mut wrap = [WRAP_REPEAT; 2];
@@ -397,10 +495,10 @@ fn texture(
         return Err(Problem::new(format!("texture {index}: no image in a supported format")));
     }
     let found: Vec<_> = sources.iter().map(|&image| item(&document.images, image, "image").map(|_| image)).collect();
-    let images: Vec<usize> = found.iter().flatten().map(|image| image.value()).collect();
+    let images: Images = found.iter().flatten().map(|image| image.value()).collect();
     match found.into_iter().find_map(Result::err) {
         Some(problem) if images.is_empty() => Err(problem),
-        _ => Ok(Texture { images, wrap: wrap[0] | wrap[1] << 16 }),
+        _ => Ok((images, wrap[0] | wrap[1] << 16)),
     }
 }
 

@@ -20,6 +20,7 @@ mod accessor;
 mod document;
 mod draco;
 mod file;
+mod further;
 mod glb;
 mod lights;
 mod materials;
@@ -31,7 +32,7 @@ mod nodes;
 use super::affine::{Affine, multiply};
 use super::bytes::{Bytes, Spool};
 use super::error::{EXPORT_AGAIN, ImportError, show};
-use super::image::decode_texture;
+use super::image::{decode_texture, pack};
 use super::opened::{Opened, Parts, TriangleBudget};
 use super::repairs::Repairs;
 use super::warnings::Warnings;
@@ -40,7 +41,7 @@ use crate::source::{
     shines_to_front,
 };
 use file::{File, Problem};
-use materials::Texture;
+use materials::{Images, Picture, Texture};
 use meshes::Checked;
 use names::{display_name, label};
 use std::path::Path;
@@ -62,8 +63,10 @@ struct Gltf {
     textures: Vec<(String, Texture)>,
     /// Where each image is, or why nowhere.
     images: Vec<Result<Bytes, String>>,
-    /// Number of materials of the file; the default one follows them.
-    materials: usize,
+    /// Where each material of the file is among all; the default ones follow them.
+    materials: Vec<u32>,
+    /// The first default one.
+    default_material: u32,
     repairs: Repairs,
 }
 
@@ -130,16 +133,19 @@ pub(super) fn open_within(
             None => needs_default = true,
         }
     }
-    let (mut materials, textures) = materials::load(&file, &is_used, &mut warnings);
+    let materials::Materials { records: mut materials, places, textures, .. } =
+        materials::load(&file, &is_used, &mut warnings);
+    let default_material = materials.len() as u32;
     if needs_default {
         materials.extend([materials::default_material(), bricks::Material::GREY]);
     }
     let image_name = |texture: &Texture| {
-        let image = texture.images[0];
+        let image = texture.image();
         display_name(image, document.images[image].0.as_ref().ok().and_then(|image| image.more.name.as_deref()))
     };
     let textures: Vec<_> = textures.into_iter().map(|texture| (image_name(&texture), texture)).collect();
-    let outlines = meshes.iter().zip(numbers_used(&numbers)).map(|(mesh, m)| mesh.outline(document, m, &materials));
+    let outlines =
+        meshes.iter().zip(numbers_used(&numbers)).map(|(mesh, m)| mesh.outline(document, m, (&materials, &places)));
     let outline = Outline {
         meshes: outlines.collect(),
         placements: place(&file, &uses, &numbers)?,
@@ -151,9 +157,9 @@ pub(super) fn open_within(
         has_animation,
         has_own_light: false,
     };
-    let materials = file.document.materials.len();
     let repairs = Repairs::new(file.label.clone());
-    let parts = Gltf { label: file.label, meshes, textures, images: file.images, materials, repairs };
+    let parts =
+        Gltf { label: file.label, meshes, textures, images: file.images, materials: places, default_material, repairs };
     Ok(Opened { outline, parts: Box::new(parts) })
 }
 
@@ -162,8 +168,8 @@ impl Parts for Gltf {
         let in_mesh = &self.meshes[mesh];
         let (number, primitive, first, end) = in_mesh.part(part);
         // Where there is none, the default one of glTF shows the vertices' colours, grey stands for what has none.
-        let default = || self.materials + usize::from(!primitive.has_colors());
-        let material = primitive.material().unwrap_or_else(default) as u32;
+        let default = self.default_material + u32::from(!primitive.has_colors());
+        let material = primitive.material().map_or(default, |material| self.materials[material]);
         let place = || format!("{} primitive {number}", in_mesh.label);
         let read = primitive.read(first, end, material).map_err(|Problem { what, remedy }| {
             let file = self.label.clone();
@@ -186,18 +192,25 @@ impl Parts for Gltf {
 
     fn texture(&self, index: usize) -> Result<SourceTexture, SourceError> {
         let (name, texture) = &self.textures[index];
-        let mut first_problem = None;
-        for &image in &texture.images {
-            let bytes = self.images[image].as_ref().map_err(String::clone);
-            match bytes.and_then(|bytes| decode_texture(bytes, name.clone(), texture.wrap)) {
-                Ok(texture) => return Ok(texture),
-                Err(problem) => first_problem.get_or_insert((image, problem)),
-            };
+        match &texture.picture {
+            Picture::Whole(images) => self.decode(images, name, texture.wrap),
+            Picture::Packed(channels) => {
+                let mut read: Vec<(&Images, SourceTexture)> = Vec::new();
+                for (images, _) in channels.iter().flatten() {
+                    if read.iter().all(|(known, _)| *known != images) {
+                        read.push((images, self.decode(images, name, texture.wrap)?));
+                    }
+                }
+                let found = |channel: &Option<(Images, usize)>| {
+                    let (images, from) = channel.as_ref()?;
+                    let at = read.iter().position(|(known, _)| *known == images)?;
+                    Some((at, *from))
+                };
+                let channels = channels.each_ref().map(found);
+                let read = read.into_iter().map(|(_, texture)| texture).collect();
+                Ok(pack(read, channels, name.clone(), texture.wrap))
+            }
         }
-        // At least one image was tried.
-        let (image, problem) = first_problem.unwrap_or_default();
-        let place = label("image", image, Some(name).filter(|name| **name != image.to_string()).map(String::as_str));
-        Err(SourceError(format!("{}: {place}: the image cannot be used ({problem})", self.label)))
     }
 
     fn repairs(&self) -> Vec<String> {
@@ -205,8 +218,31 @@ impl Parts for Gltf {
     }
 }
 
+impl Gltf {
+    /// The first of these images that can be decoded.
+    fn decode(&self, images: &Images, name: &str, wrap: u32) -> Result<SourceTexture, SourceError> {
+        let mut first_problem = None;
+        for &image in images {
+            let bytes = self.images[image].as_ref().map_err(String::clone);
+            match bytes.and_then(|bytes| decode_texture(bytes, name.to_owned(), wrap)) {
+                Ok(texture) => return Ok(texture),
+                Err(problem) => first_problem.get_or_insert((image, problem)),
+            };
+        }
+        // At least one image was tried.
+        let (image, problem) = first_problem.unwrap_or_default();
+        let place = label("image", image, Some(name).filter(|name| **name != image.to_string()));
+        Err(SourceError(format!("{}: {place}: the image cannot be used ({problem})", self.label)))
+    }
+}
+
 impl Mesh {
-    fn outline(&self, document: &document::Document, number: usize, materials: &[bricks::Material]) -> MeshOutline {
+    fn outline(
+        &self,
+        document: &document::Document,
+        number: usize,
+        (materials, places): (&[bricks::Material], &[u32]),
+    ) -> MeshOutline {
         let part = |&(primitive, first): &(u32, u64)| {
             let triangles = self.primitives[primitive as usize].triangles() - first;
             // In range: at most `PART_TRIANGLES`.
@@ -214,8 +250,10 @@ impl Mesh {
         };
         let name = display_name(number, document.meshes[number].name.as_deref());
         // The default material does not shine.
-        let shines =
-            |primitive: &Checked| primitive.material().and_then(|m| materials.get(m)).is_some_and(shines_to_front);
+        let shines = |primitive: &Checked| {
+            let material = primitive.material().and_then(|m| materials.get(*places.get(m)? as usize));
+            material.is_some_and(shines_to_front)
+        };
         let shines_to_front = self.primitives.iter().any(shines);
         MeshOutline { name, parts: self.parts.iter().map(part).collect(), shines_to_front }
     }

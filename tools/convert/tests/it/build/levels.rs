@@ -3,7 +3,9 @@
 use super::bounded::{Computed, bounded, bytes};
 use super::decode::{DecodedBrick, decode, decode_levels};
 use super::scenes::*;
-use bricks::{Level, MATERIAL_MASK, NONE, Resident};
+use bricks::{
+    Layers, Level, MATERIAL_FURTHER, MATERIAL_LAYERS, MATERIAL_MASK, MATERIAL_MORE, Material, NONE, Resident,
+};
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{IDENTITY, Primitive, SourceScene, SourceTexture};
@@ -579,6 +581,24 @@ fn textures_become_colours_of_vertices() {
         }
     }
     assert!(sides[0] > 10 && sides[1] > 10, "{sides:?}");
+}
+
+/// What stands for surfaces with layers has them, and no further textures.
+#[test]
+fn layers_are_kept_without_their_textures() {
+    let mut scene = two_coloured(255);
+    let layers = Layers { sheen: [1.0; 3], sheen_roughness: 1.0, film: 1.0, film_index: 1.5, ..Layers::NONE };
+    scene.materials[0].set_layers(&layers);
+    scene.materials[0].flags |= MATERIAL_MORE;
+    scene.materials.insert(1, Material { emissive_texture: 0, ..Material::further() });
+    // Reading a file checks its materials.
+    let (resident, bricks) = decode_levels(&built(&scene, &with_levels(500)).path());
+    assert!(resident.manifest.has_textures && resident.textures.len() == 1);
+    let seen = bricks.last().unwrap().triangle(0).material;
+    let material = &resident.materials[seen as usize];
+    assert!(seen > 1 && material.flags & (MATERIAL_LAYERS | MATERIAL_MORE) == MATERIAL_LAYERS);
+    assert_eq!(material.layers(), resident.materials[0].layers());
+    assert_eq!(resident.materials[1].flags, MATERIAL_FURTHER);
 }
 
 #[test]

@@ -2,8 +2,9 @@
 
 use super::writer::*;
 use bricks::{
-    LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_ANISOTROPIC, MATERIAL_BLEND, MATERIAL_LAYERS, MATERIAL_REFRACTS,
-    Material, NONE, unpack_absorption,
+    BASE_COLOR, EMISSIVE, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, MATERIAL_ANISOTROPIC, MATERIAL_BLEND,
+    MATERIAL_FURTHER, MATERIAL_LAYERS, MATERIAL_MORE, MATERIAL_REFRACTS, METALLIC_ROUGHNESS, Material, NONE, NORMAL,
+    OCCLUSION, unpack_absorption,
 };
 use brickwalk_convert::import::Input;
 use brickwalk_convert::source::{Primitive, SourceScene};
@@ -148,12 +149,12 @@ fn dielectrics_reflect_by_their_index_and_their_factors() {
     assert_eq!(of(json!({"KHR_materials_ior": {"ior": 1}})), ([0.0; 3], 1.0, 0));
     assert_eq!(of(json!({"KHR_materials_ior": {"ior": 0}})), ([1.0; 3], 1.0, 0));
     assert_eq!(of(json!({"KHR_materials_specular": {"specularFactor": 0}})), ([0.0; 3], 0.0, 0));
-    let colored = json!({"specularFactor": 0.5, "specularColorFactor": [1, 2, 100], "specularTexture": {"index": 0}});
+    let colored = json!({"specularFactor": 0.5, "specularColorFactor": [1, 2, 100]});
     let (specular, weight, warnings) = of(json!({"KHR_materials_ior": {"ior": 3}, "KHR_materials_specular": colored}));
-    assert_eq!((specular, weight, warnings), ([0.125, 0.25, 0.5], 0.5, 1));
-    let coat = json!({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25, "clearcoatTexture": {"index": 0}});
+    assert_eq!((specular, weight, warnings), ([0.125, 0.25, 0.5], 0.5, 0));
+    let coat = json!({"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25});
     let (coated, warnings) = material(json!({"extensions": {"KHR_materials_clearcoat": coat}}));
-    assert_eq!((coated.clearcoat, coated.clearcoat_roughness, warnings.len()), (0.5, 0.25, 1));
+    assert_eq!((coated.clearcoat, coated.clearcoat_roughness, warnings.len()), (0.5, 0.25, 0));
     let gloss = json!({"diffuseFactor": [0.5, 0.25, 0, 1], "specularFactor": [0.75, 0.5, 0.25],
         "glossinessFactor": 0.75, "diffuseTexture": {"index": 1}, "specularGlossinessTexture": {"index": 0}});
     let pbr = json!({"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 0}});
@@ -255,18 +256,7 @@ fn sheen_anisotropy_and_films_are_kept() {
     ] {
         assert_eq!(material(json!({"extensions": none})).0, material(json!({})).0);
     }
-    // Their textures are left out, and films on thin walls, with a warning each.
-    for (name, texture) in [
-        ("sheen", json!({"sheenColorFactor": [1, 1, 1], "sheenColorTexture": {"index": 0}})),
-        ("anisotropy", json!({"anisotropyStrength": 1, "anisotropyTexture": {"index": 0}})),
-        ("iridescence", json!({"iridescenceFactor": 1, "iridescenceThicknessTexture": {"index": 0}})),
-    ] {
-        let mut extensions = json!({});
-        extensions[format!("KHR_materials_{name}")] = texture;
-        let (found, warnings) = material(json!({"extensions": extensions}));
-        assert!(warnings.len() == 1 && warnings[0].contains(name), "{warnings:?}");
-        assert_ne!(found.flags & MATERIAL_LAYERS, 0);
-    }
+    // Films on thin walls are left out, with a warning.
     let glass = |volume: Value| {
         let extensions = json!({"KHR_materials_iridescence": {"iridescenceFactor": 1}, "KHR_materials_volume": volume,
             "KHR_materials_transmission": {"transmissionFactor": 1}});
@@ -276,6 +266,101 @@ fn sheen_anisotropy_and_films_are_kept() {
     assert!(warnings.len() == 1 && warnings[0].contains("thin walls") && wall.flags & MATERIAL_LAYERS == 0);
     let (body, warnings) = glass(json!({"thicknessFactor": 1}));
     assert!(warnings.is_empty() && body.flags & MATERIAL_LAYERS != 0);
+}
+
+/// The square, with an image of 2x1 texels as texture 3 and one of 4x2 as texture 4.
+fn with_images(material: Value) -> Writer {
+    let mut file = square(material);
+    for (width, height, rgba) in
+        [(2, 1, (1..9u8).map(|i| 10 * i).collect::<Vec<_>>()), (4, 2, (0..32u8).map(|i| 100 + i).collect::<Vec<_>>())]
+    {
+        let view = file.view(&png(width, height, &rgba));
+        let image = file.push("images", json!({"bufferView": view}));
+        file.push("textures", json!({"source": image}));
+    }
+    file
+}
+
+#[test]
+fn further_textures_are_packed() {
+    let mut file = with_images(json!({
+        "normalTexture": {"index": 0},
+        "extensions": {
+            "KHR_materials_specular": {"specularTexture": {"index": 4}, "specularColorTexture": {"index": 4}},
+            "KHR_materials_clearcoat": {
+                "clearcoatFactor": 0.5,
+                "clearcoatTexture": {"index": 3},
+                "clearcoatRoughnessTexture": {"index": 4},
+                "clearcoatNormalTexture": {"index": 2, "scale": 0.25, "texCoord": 1}
+            },
+            // The thickness has other coordinates than the coat.
+            "KHR_materials_iridescence": {"iridescenceFactor": 1, "iridescenceThicknessMaximum": 500,
+                "iridescenceTexture": {"index": 4}, "iridescenceThicknessTexture": {"index": 4, "texCoord": 1}},
+            "KHR_materials_anisotropy": {"anisotropyStrength": 1, "anisotropyTexture": {"index": 4}},
+            "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 1,
+                "sheenColorTexture": {"index": 4}, "sheenRoughnessTexture": {"index": 3}}
+        }
+    }));
+    // Another material, and none: what lies behind materials with further textures is found.
+    let mut other = file.root["meshes"][0]["primitives"][0].clone();
+    other["material"] = json!(1);
+    file.root["meshes"][0]["primitives"].as_array_mut().unwrap().push(other.clone());
+    other.as_object_mut().unwrap().remove("material");
+    file.root["meshes"][0]["primitives"].as_array_mut().unwrap().push(other);
+    file.push("materials", json!({"pbrMetallicRoughness": {"roughnessFactor": 0.5}}));
+    let scene = file.scene();
+    assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("different coordinates"), "{:?}", scene.warnings);
+    let of_primitives: Vec<u32> = scene.meshes[0].primitives.iter().map(|primitive| primitive.material).collect();
+    assert_eq!((of_primitives, scene.materials.len()), (vec![0, 2, 4], 5));
+    assert_eq!(scene.materials[2].roughness, 0.5);
+
+    let [material, further] = [scene.materials[0], scene.materials[1]];
+    assert_eq!(material.flags & (MATERIAL_MORE | MATERIAL_LAYERS), MATERIAL_MORE | MATERIAL_LAYERS);
+    assert_eq!((material.layers().film_least, material.layers().film_thickness), (100.0, 500.0));
+    assert_eq!((further.flags, further.normal_scale, further.uv_sets), (MATERIAL_FURTHER, 0.25, 1 << NORMAL));
+    let texels = |place: usize| {
+        let texture = &scene.textures[further.textures()[place] as usize];
+        ([texture.width, texture.height], texture.rgba.as_chunks::<4>().0.to_vec())
+    };
+    // Colour and weight come from one image.
+    let image: Vec<[u8; 4]> = (0..8).map(|i| std::array::from_fn(|k| 100 + 4 * i + k as u8)).collect();
+    assert_eq!(texels(BASE_COLOR), ([4, 2], image.clone()));
+    assert_eq!(texels(NORMAL), ([1, 1], vec![[128, 128, 255, 255]]));
+    // The coat from an image half as large, whose texels are interpolated; no thickness.
+    let (size, coat) = texels(METALLIC_ROUGHNESS);
+    assert_eq!(size, [4, 2]);
+    let columns: Vec<u8> = coat.iter().map(|texel| texel[0]).collect();
+    assert_eq!(columns[..4], columns[4..]);
+    assert!(columns[..4].is_sorted() && columns[0] == 10 && columns[3] == 50 && columns[1] == 20, "{columns:?}");
+    for (texel, own) in coat.iter().zip(&image) {
+        assert_eq!(texel[1..], [own[1], own[0], 255]);
+    }
+    let opaque: Vec<[u8; 4]> = image.iter().map(|&[r, g, b, _]| [r, g, b, 255]).collect();
+    assert_eq!(texels(OCCLUSION), ([4, 2], opaque));
+    let (_, sheen) = texels(EMISSIVE);
+    assert!(sheen.iter().zip(&image).all(|(texel, own)| texel[..3] == own[..3]));
+    assert_eq!((sheen[0][3], sheen[3][3]), (40, 80));
+}
+
+#[test]
+fn coats_over_bumps_have_normals_of_their_own() {
+    let coated = |more: Value| {
+        let mut material = json!({"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1}}});
+        material.as_object_mut().unwrap().extend(more.as_object().unwrap().clone());
+        with_images(material).scene()
+    };
+    let bumpy = coated(json!({"normalTexture": {"index": 0}}));
+    assert_eq!(bumpy.materials[1], Material::further());
+    assert!(bumpy.materials.len() == 2 && bumpy.materials[0].flags & MATERIAL_MORE != 0);
+    let smooth = coated(json!({}));
+    assert!(smooth.materials.len() == 1 && smooth.materials[0].flags & MATERIAL_MORE == 0);
+    // What a factor of zero leaves nothing of has no textures; an image that is missing is white, with a warning.
+    let bare = coated(json!({"extensions": {"KHR_materials_clearcoat": {"clearcoatTexture": {"index": 3}}}}));
+    assert!(bare.materials.len() == 1 && bare.textures.is_empty());
+    let missing = json!({"extensions": {"KHR_materials_clearcoat":
+        {"clearcoatFactor": 1, "clearcoatTexture": {"index": 99}}}});
+    let missing = coated(missing);
+    assert!(missing.materials.len() == 1 && missing.warnings[0].contains("white used"), "{:?}", missing.warnings);
 }
 
 #[test]
