@@ -5,7 +5,8 @@
     tools/contact_sheet.py --scenes ../shared/scenes --brickwalk target/release/brickwalk -o DIR [--spp 16]
 
 Rows are lights, columns the views of paths/sponza_1.json to sponza_5.json. Every picture is kept in DIR and not made
-twice; the sheet is DIR/sheet.jpg. Every picture is exposed by itself, has all light with eight bounces, and is denoised.
+twice; the sheet is DIR/sheet.jpg. Every picture is exposed by itself, has all light with eight bounces and is
+denoised.
 """
 
 import argparse

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# Makes the pictures of docs/: generates a city, a plant, woods and a stadium, renders each with `--quality high`, beside
-# Sponza where its folder is given, and puts them on one sheet. Half an hour on two cores, and an hour with SCENES.
-# Pictures that are there are not made twice.
+# Makes the pictures of docs/: generates a city, a plant, woods and a stadium, renders each with `--quality high`,
+# beside Sponza where its folder is given, and puts them on one sheet. Half an hour on two cores, and an hour with
+# SCENES. Pictures that are there are not made twice.
 #
 #   tools/pictures.sh DIR [SCENES]
 #
-# DIR keeps scenes and pictures. It gets pictures.jpg, and window.jpg where there are Xvfb, openbox and import.
+# DIR keeps scenes and pictures. It gets pictures.jpg, and window.jpg where there are Xvfb, openbox, import and convert.
 # SCENES is a folder with sponza/Sponza.gltf and env/, for sponza.jpg, Sponza under six lights, and study.jpg, plots of
 # a study of it, which take chromium. It needs python3 with pillow.
 set -euo pipefail
@@ -59,12 +59,11 @@ window() {
     DISPLAY=$display import -window root "$out/window.png"
     kill "$view" "$server"
     wait "$view" "$server" 2>/dev/null || true
-    python3 -c 'import sys; from PIL import Image; Image.open(sys.argv[1]).convert("RGB").save(sys.argv[2], quality=88)' \
-        "$out/window.png" "$out/window.jpg"
+    convert "$out/window.png" -quality 88 "$out/window.jpg"
 }
 
 has() { command -v "$1" >/dev/null; }
-if [ ! -e "$out/window.jpg" ] && has Xvfb && has openbox && has import; then
+if [ ! -e "$out/window.jpg" ] && has Xvfb && has openbox && has import && has convert; then
     echo "window"
     window
 fi
@@ -75,10 +74,13 @@ if [ $# -ge 2 ]; then
     python3 "$root/tools/contact_sheet.py" --scenes "$2" --brickwalk "$brickwalk" -o "$lights"
     cp "$lights/sheet.jpg" "$out/sponza.jpg"
     if has chromium; then
-        "$brickwalk" study "$out/sponza.bricks" -o "$out/study" --path "$root/paths/sponza.json" \
-            --effects ao,diffuse --caches 100% --budget 20 --quiet
-        python3 "$root/tools/study_picture.py" "$out/study/report.html" -o "$out/study.jpg" \
-            "FLIP over time: ao, cache 100 %, warm" "FLIP over time: diffuse, cache 100 %, warm"
+        for effect in ao diffuse; do
+            "$brickwalk" study "$out/sponza.bricks" -o "$out/study-$effect" --path "$root/paths/sponza.json" \
+                --effects "$effect" --caches 100 --budget 25 --quiet
+        done
+        python3 "$root/tools/study_picture.py" -o "$out/study.jpg" \
+            "$out/study-ao/report.html#FLIP over time: ao, cache 100 %, warm" \
+            "$out/study-diffuse/report.html#FLIP over time: diffuse, cache 100 %, warm"
     fi
 fi
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Puts plots of a study's page side by side, as one picture.
+"""Puts plots of the pages of studies side by side, as one picture.
 
     pip install pillow
-    tools/study_picture.py DIR/report.html -o study.jpg "FLIP over time: ao, cache 100 %, warm" ...
+    tools/study_picture.py -o study.jpg "DIR/report.html#FLIP over time: ao, cache 100 %, warm" ...
 
-Plots are named by their headings. It needs chromium, or another browser that --browser names.
+Plots are named by their page and their heading. It needs chromium, or another browser that --browser names.
 """
 
 import argparse
@@ -17,30 +17,35 @@ import tempfile
 from PIL import Image, ImageChops
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("report", type=pathlib.Path, help="page of a study")
-    parser.add_argument("plots", nargs="+", metavar="HEADING", help="headings of plots")
-    parser.add_argument("-o", "--output", type=pathlib.Path, required=True, help="picture to write")
-    parser.add_argument("--browser", default="chromium", help="default: %(default)s")
-    options = parser.parse_args()
-    page = options.report.read_text(encoding="utf-8")
+def plot(name):
+    """The page's head and the plot of `PAGE#HEADING`."""
+    path, _, wanted = name.partition("#")
+    page = pathlib.Path(path).read_text(encoding="utf-8")
     figures = {}
     for figure in re.findall(r'<figure class="plot">.*?</figure>', page, re.DOTALL):
         heading = re.search(r"<h3>(.*?)</h3>", figure, re.DOTALL)
         if heading:
             figures[heading.group(1)] = figure
-    unknown = [name for name in options.plots if name not in figures]
-    if unknown:
-        sys.exit(f"{options.report}: no plot \"{unknown[0]}\"; there are: {', '.join(sorted(figures))}")
-    head = re.search(r"<head>.*?</head>", page, re.DOTALL).group(0)
-    chosen = "".join(figures[name] for name in options.plots)
-    wide = f'<div style="display: grid; grid-template-columns: repeat({len(options.plots)}, 1fr); gap: 24px">{chosen}</div>'
+    if wanted not in figures:
+        sys.exit(f'{path}: no plot "{wanted}"; there are: {", ".join(sorted(figures))}')
+    return re.search(r"<head>.*?</head>", page, re.DOTALL).group(0), figures[wanted]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("plots", nargs="+", metavar="PAGE#HEADING", help="pages of studies, and headings of plots")
+    parser.add_argument("-o", "--output", type=pathlib.Path, required=True, help="picture to write")
+    parser.add_argument("--browser", default="chromium", help="default: %(default)s")
+    options = parser.parse_args()
+    plots = [plot(name) for name in options.plots]
+    head, chosen = plots[0][0], "".join(figure for _, figure in plots)
+    wide = f'<div style="display: grid; grid-template-columns: repeat({len(plots)}, 1fr); gap: 24px">{chosen}</div>'
     with tempfile.TemporaryDirectory() as folder:
         alone, shot = pathlib.Path(folder, "page.html"), pathlib.Path(folder, "page.png")
-        alone.write_text(f'<!doctype html><html lang="en">{head}<body style="margin: 16px">{wide}</body></html>', "utf-8")
+        body = f'<body style="margin: 16px">{wide}</body>'
+        alone.write_text(f'<!doctype html><html lang="en">{head}{body}</html>', "utf-8")
         words = [options.browser, "--headless", "--no-sandbox", "--hide-scrollbars", "--force-device-scale-factor=1.5"]
-        words += [f"--window-size={620 * len(options.plots)},700", f"--screenshot={shot}", alone.as_uri()]
+        words += [f"--window-size={620 * len(plots)},700", f"--screenshot={shot}", alone.as_uri()]
         subprocess.run(words, check=True, capture_output=True)
         picture = Image.open(shot).convert("RGB")
     # What is below the plots is empty.
