@@ -1,5 +1,6 @@
 //! Mip chains of textures, averaged by what their texels mean, cut into tiles.
 
+use super::content::Content;
 use super::roughness::{Bumps, bumps};
 use super::small::{SMALL_TEXELS, Small};
 use crate::build::disk::journal::{WordReader, Words};
@@ -10,11 +11,10 @@ use crate::progress::Progress;
 use crate::source::{Outline, Source, SourceTexture};
 use block_compression::encode::compress_rgba8;
 use block_compression::{BC7Settings, CompressionVariant};
-use bricks::{BLOCK_TEXELS, MATERIAL_TEXTURES, MAX_TEXTURE_SIZE, Material, NONE, Span, TILE_TEXELS, Texture, Writer};
-use bricks::{MATERIAL_FURTHER, TEXTURE_BC5, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
+use bricks::{BLOCK_TEXELS, MAX_TEXTURE_SIZE, Material, NONE, Span, TILE_TEXELS, Texture, Writer};
+use bricks::{TEXTURE_BC5, TEXTURE_BC7, TEXTURE_RGBA8, TEXTURE_SRGB, WRAP_MIRROR, WRAP_REPEAT};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
-use std::sync::LazyLock;
 
 /// A texture with all its levels.
 #[derive(Debug)]
@@ -29,30 +29,6 @@ pub(crate) struct EncodedTexture {
     pub mean: [f32; 3],
     /// A small copy, of colours.
     pub small: Option<Small>,
-}
-
-/// What texels mean.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Content {
-    /// Colour in sRGB, with alpha. Coarser levels average light.
-    Color,
-    /// Numbers. Coarser levels average them; alpha is not kept.
-    Data,
-    /// Numbers, alpha one of them.
-    Numbers,
-    /// Directions. Texels of coarser levels are the directions of the means of those of the finest; alpha is not kept.
-    Normals,
-}
-
-impl Content {
-    /// Of the textures of a material, by their places.
-    fn of(material: &Material) -> [Content; MATERIAL_TEXTURES] {
-        let third = if material.flags & MATERIAL_FURTHER != 0 { Content::Numbers } else { Content::Data };
-        [Content::Color, Content::Normals, third, Content::Data, Content::Color]
-    }
-
-    /// How many there are.
-    const COUNT: usize = 4;
 }
 
 /// Which textures some material uses, and for what, ascending. One that is used in two ways is stored twice.
@@ -292,7 +268,7 @@ pub(crate) fn encode(
     if encoding == TEXTURE_BC5 {
         // Unit vectors.
         texels.clear();
-        content.encode(&level, &mut texels);
+        content.encode(&level.texels, &mut texels);
     }
     let is_alike =
         |normals: &SourceTexture| (normals.width, normals.height) == (width, height) && normals.rgba.len() == bytes;
@@ -309,9 +285,9 @@ pub(crate) fn encode(
                 *means = means.halve();
                 let mut widened = Image { texels: level.texels.clone(), ..level };
                 widened.texels.iter_mut().zip(&means.texels).for_each(|(texel, mean)| bumps.widen(texel, mean));
-                content.encode(&widened, &mut texels);
+                content.encode(&widened.texels, &mut texels);
             } else {
-                content.encode(&level, &mut texels);
+                content.encode(&level.texels, &mut texels);
             }
         }
         let size = record.size(number);
@@ -411,87 +387,9 @@ fn taps(from: usize, to: usize, i: usize) -> Taps {
     Taps { first, weights }
 }
 
-static LINEAR_OF_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|i| {
-        let x = i as f64 / 255.0;
-        (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
-    })
-});
-
-/// The linear value of one of sRGB.
-pub(super) fn linear_of_srgb(value: u8) -> f32 {
-    LINEAR_OF_SRGB[value as usize]
-}
-
-/// Linear values from which on the sRGB value is at least i + 1.
-static SRGB_BORDERS: LazyLock<[f32; 255]> = LazyLock::new(|| {
-    std::array::from_fn(|i| {
-        let x = (i as f64 + 0.5) / 255.0;
-        (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
-    })
-});
-
-/// Sections of the linear range, for finding borders fast.
-const SECTIONS: usize = 1024;
-
-/// Borders at or below the start of each section.
-static FIRST_BORDER: LazyLock<[u8; SECTIONS + 1]> = LazyLock::new(|| {
-    std::array::from_fn(|section| {
-        let start = section as f32 / SECTIONS as f32;
-        SRGB_BORDERS.partition_point(|&border| border <= start) as u8
-    })
-});
-
-/// The nearest sRGB value of a linear one.
-fn srgb(linear: f32) -> u8 {
-    let linear = linear.clamp(0.0, 1.0);
-    let mut value = FIRST_BORDER[(linear * SECTIONS as f32) as usize];
-    while value < 255 && SRGB_BORDERS[value as usize] <= linear {
-        value += 1;
-    }
-    value
-}
-
-impl Content {
-    /// What RGBA8 stands for: linear RGBA. Directions are numbers like others: their mean is that of the vectors, which
-    /// lie in a cube twice as large about its middle.
-    fn decode(self, rgba: &[u8]) -> Vec<[f32; 4]> {
-        let table = &*LINEAR_OF_SRGB;
-        let (texels, _) = rgba.as_chunks::<4>();
-        let unorm = |byte: u8| f32::from(byte) / 255.0;
-        let texels = texels.par_iter().with_min_len(1 << 14);
-        match self {
-            Self::Color => texels
-                .map(|&[r, g, b, a]| [table[r as usize], table[g as usize], table[b as usize], unorm(a)])
-                .collect(),
-            Self::Data | Self::Numbers | Self::Normals => texels.map(|texel| texel.map(unorm)).collect(),
-        }
-    }
-
-    /// The inverse, rounded.
-    fn encode(self, level: &Image, out: &mut Vec<u8>) {
-        let byte = |x: f32| (x.clamp(0.0, 1.0) * 255.0).round() as u8;
-        let texels = level.texels.iter();
-        match self {
-            Self::Color => out.extend(texels.flat_map(|&[r, g, b, a]| [srgb(r), srgb(g), srgb(b), byte(a)])),
-            Self::Data | Self::Numbers => out.extend(texels.flat_map(|texel| texel.map(byte))),
-            Self::Normals => out.extend(texels.flat_map(|&[r, g, b, _]| {
-                let [x, y, z] = direction([r, g, b]).map(|c| byte(0.5 * c + 0.5));
-                [x, y, z, 255]
-            })),
-        }
-    }
-}
-
-/// The unit vector of a mean texel of normals; along the surface's normal where the vectors cancel out.
-fn direction(rgb: [f32; 3]) -> [f32; 3] {
-    let v = rgb.map(|c| 2.0 * c - 1.0);
-    let length = v.iter().map(|c| c * c).sum::<f32>().sqrt();
-    if length > 1e-6 { v.map(|c| c / length) } else { [0.0, 0.0, 1.0] }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::content::direction;
     use super::*;
     use block_compression::decode::decompress_blocks_as_rgba8;
 
@@ -502,19 +400,6 @@ mod tests {
     fn texture(width: u32, height: u32, texel: impl Fn(u32, u32) -> [u8; 4]) -> SourceTexture {
         let rgba = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).flat_map(|(x, y)| texel(x, y)).collect();
         SourceTexture { name: "test".to_owned(), width, height, wrap: 0, rgba }
-    }
-
-    #[test]
-    fn srgb_is_nearest() {
-        for i in 0..=255u8 {
-            assert_eq!(srgb(LINEAR_OF_SRGB[i as usize]), i);
-        }
-        for i in 0..=10_000 {
-            let x = i as f32 / 10_000.0;
-            let y = f64::from(x);
-            let exact = 255.0 * if y <= 0.0031308 { y * 12.92 } else { 1.055 * y.powf(1.0 / 2.4) - 0.055 };
-            assert!((f64::from(srgb(x)) - exact).abs() <= 0.501, "{x}");
-        }
     }
 
     #[test]
@@ -621,7 +506,7 @@ mod tests {
             let [width, height] = size.map(|side| side as usize);
             texels.clear();
             let level = Image { width, height, texels: Content::Normals.decode(&texture.rgba) };
-            Content::Normals.encode(&level, &mut texels);
+            Content::Normals.encode(&level.texels, &mut texels);
         }
         let blocks = encode_grid(texels, size[0], Some(variant));
         let milliseconds = 1e3 * start.elapsed().as_secs_f64();
