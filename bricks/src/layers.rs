@@ -134,7 +134,7 @@ impl Material {
     ///
     /// | place | texture |
     /// | --- | --- |
-    /// | base colour | sRGB: what the dielectric part reflects; alpha: its weight (KHR_materials_specular) |
+    /// | base colour | sRGB: what the dielectric part reflects; alpha: its weight (KHR_materials_specular). Of a body that refracts, alpha alone: what it transmits |
     /// | normal | linear: of the clear coat; without one it has that of the surface before its normal texture |
     /// | metallic-roughness | linear: clear coat, its roughness, share of the film, its thickness |
     /// | occlusion | linear: direction of the anisotropy, 2 rg - 1, and its strength |

@@ -61,7 +61,8 @@ fn table_at(first: u32, cosine: f32, alpha: f32) -> vec2<f32> {
 }
 
 // Of hit `index` of the set, seen along -view, of any length.
-fn gloss_of(g: GBuffer, index: u32, view: vec3<f32>) -> Gloss {
+fn gloss_of(seen: GBuffer, index: u32, view: vec3<f32>) -> Gloss {
+    var g = seen;
     let m = materials[g.material];
     var s: Gloss;
     s.diffuse = g.albedo;
@@ -79,19 +80,27 @@ fn gloss_of(g: GBuffer, index: u32, view: vec3<f32>) -> Gloss {
     let around = facets_around(s);
     let white = around.x + around.y;
     var bounces = (1.0 - white) / white;
-    var specular = m.specular * (x.specular * x.specular_weight);
-    let specular_weight = m.specular_weight * x.specular_weight;
+    var specular = m.specular;
+    var specular_weight = m.specular_weight;
     var inside = 0.0;
-    if (m.flags & MATERIAL_REFRACTS) != 0u {
+    if (m.flags & MATERIAL_REFRACTS) == 0u {
+        specular *= x.specular * x.specular_weight;
+        specular_weight *= x.specular_weight;
+    } else {
+        let share = m.transmission * x.specular_weight;
         if (g.state & GBUFFER_REFRACTS) != 0u {
             let root = sqrt(m.specular.x);
             let ior = (1.0 + root) / (1.0 - root);
             s.eta = select(1.0 / ior, ior, (g.state & GBUFFER_BACK) != 0u);
-            inside = m.transmission;
+            inside = share;
             bounces = 0.0;
         } else {
-            // Rays that meet it stand for those as well that pass.
-            specular = min(specular / max(m.base_color.a, 1.0e-6), vec3<f32>(1.0));
+            // Rays that meet it stand for those as well that pass straight through, by alpha. Light enters it more often,
+            // and by as much its base colour is brighter.
+            let passing = share * (1.0 - m.metallic) * max(m.base_color.r, max(m.base_color.g, m.base_color.b));
+            let alpha = 1.0 - passing * (1.0 - m.specular.x);
+            specular = min(specular / max(alpha, 1.0e-6), vec3<f32>(1.0));
+            g.albedo *= select(0.0, (1.0 - share) / (1.0 - passing), passing < 1.0);
         }
     }
     let of_dielectric = vec3<f32>(1.0) + specular * bounces;

@@ -53,13 +53,6 @@ fn footprint_of(ray: Ray, t: f32, surface: Surface, uvs: array<vec2<f32>, 3>) ->
     return barrier(divide(uv_area, max(surface.area, 1.0e-30)) * barrier(width * width));
 }
 
-// Of the base colour of a body that rays pass straight through, what they meet shows: they meet it less often than
-// light enters it, and by as much it is brighter.
-fn beside_passing(m: Material) -> f32 {
-    let passing = m.transmission * (1.0 - m.metallic) * max(m.base_color.r, max(m.base_color.g, m.base_color.b));
-    return select(0.0, (1.0 - m.transmission) / (1.0 - passing), passing < 1.0);
-}
-
 // One thread a pixel.
 @compute @workgroup_size(8, 8)
 fn main(@builtin(global_invocation_id) global: vec3<u32>) {
@@ -193,12 +186,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         g = settled(g, material.flags);
     }
     g.state |= select(0u, GBUFFER_BACK, is_turned);
-    if (material.flags & MATERIAL_REFRACTS) != 0u {
-        if (params.flags & PARAM_REFRACT) != 0u {
-            g.state |= GBUFFER_REFRACTS;
-        } else {
-            g.albedo *= beside_passing(material);
-        }
+    if (material.flags & MATERIAL_REFRACTS) != 0u && (params.flags & PARAM_REFRACT) != 0u {
+        g.state |= GBUFFER_REFRACTS;
     }
     gbuffer[index] = g;
 }

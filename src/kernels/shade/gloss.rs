@@ -11,7 +11,7 @@ use crate::kernels::layout::{
     PARAM_GLOSSY,
 };
 use crate::kernels::reflectance::REFLECTANCES;
-use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, most3, normalize};
+use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, most3, normalize, xyz};
 use crate::math::sampling::pcg;
 use bricks::{Material, unpack_absorption};
 use std::f32::consts::{PI, TAU};
@@ -68,6 +68,7 @@ impl Gloss {
     pub fn of<'a>(hit: impl Into<Shown<'a>>, m: &Material, view: Vec3) -> Self {
         let shown = hit.into();
         let (g, x): (&GBuffer, More) = (&shown, shown.more(m));
+        let mut albedo = g.albedo;
         let mut s = Self { diffuse: g.albedo, ..Self::default() };
         let has_layers = m.flags & MATERIAL_LAYERS != 0;
         let is_matt = !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0 || has_layers);
@@ -82,31 +83,39 @@ impl Gloss {
         let stretched = s.layers.and_then(|layers| layers.facets_around(&s.below()));
         let [along, grazing] = stretched.unwrap_or_else(|| table_at(&REFLECTANCES, s.cos_view, s.alpha));
         let white = along + grazing;
-        let mut specular = each(|k| m.specular[k] * (x.specular[k] * x.specular_weight));
-        let specular_weight = m.specular_weight * x.specular_weight;
+        let (mut specular, mut specular_weight) = (m.specular, m.specular_weight);
         let (mut bounces, mut inside) = ((1.0 - white) / white, 0.0);
-        if m.flags & MATERIAL_REFRACTS != 0 {
+        if m.flags & MATERIAL_REFRACTS == 0 {
+            specular = each(|k| specular[k] * (x.specular[k] * x.specular_weight));
+            specular_weight *= x.specular_weight;
+        } else {
+            let share = m.transmission * x.specular_weight;
             if g.state & GBUFFER_REFRACTS != 0 {
                 let root = m.specular[0].sqrt();
                 let ior = (1.0 + root) / (1.0 - root);
                 s.eta = if g.state & GBUFFER_BACK != 0 { ior } else { 1.0 / ior };
-                (bounces, inside) = (0.0, m.transmission);
+                (bounces, inside) = (0.0, share);
             } else {
-                // Rays that meet it stand for those as well that pass.
-                specular = specular.map(|c| least(c / most(m.base_color[3], 1.0e-6), 1.0));
+                // Rays that meet it stand for those as well that pass straight through, by alpha. Light enters it more
+                // often, and by as much its base colour is brighter.
+                let passing = share * (1.0 - m.metallic) * most3(xyz(m.base_color));
+                let alpha = 1.0 - passing * (1.0 - m.specular[0]);
+                specular = specular.map(|c| least(c / most(alpha, 1.0e-6), 1.0));
+                let rest = if passing < 1.0 { (1.0 - share) / (1.0 - passing) } else { 0.0 };
+                albedo = albedo.map(|c| c * rest);
             }
         }
         let of_dielectric = specular.map(|c| 1.0 + c * bounces);
-        let of_metal = g.albedo.map(|c| 1.0 + c * bounces);
-        s.f0 = each(|k| mix(specular[k] * of_dielectric[k], g.albedo[k] * of_metal[k], g.metallic));
+        let of_metal = albedo.map(|c| 1.0 + c * bounces);
+        s.f0 = each(|k| mix(specular[k] * of_dielectric[k], albedo[k] * of_metal[k], g.metallic));
         s.f90 = each(|k| mix(specular_weight * of_dielectric[k], of_metal[k], g.metallic));
         s.share = each(|k| s.f0[k] * along + s.f90[k] * grazing);
         let mut left = each(|k| 1.0 - (specular[k] * along + specular_weight * grazing) * of_dielectric[k]);
         let below = s.below();
         if let Some(layers) = &mut s.layers {
-            layers.lay_film(&below, (&mut s.share, &mut left), specular, g, [white, bounces]);
+            layers.lay_film(&below, (&mut s.share, &mut left), specular, (albedo, g.metallic), [white, bounces]);
         }
-        let below_facets = g.albedo.map(|c| c * (1.0 - g.metallic));
+        let below_facets = albedo.map(|c| c * (1.0 - g.metallic));
         s.diffuse = each(|k| below_facets[k] * (1.0 - inside) * most(left[k], 0.0));
         s.through = below_facets.map(|c| c * inside);
         s.coat = m.clearcoat * x.coat;

@@ -228,14 +228,14 @@ impl Layers {
     }
 
     /// Puts the film on the facets: what they reflect of light from everywhere, and what of it is left to the diffuse
-    /// part, which is that of the brightest colour. `white`: what white facets reflect by single bounces; `bounces`: by
-    /// what more.
+    /// part, which is that of the brightest colour. `albedo`: of metal. `white`: what white facets reflect by single
+    /// bounces; `bounces`: by what more.
     pub fn lay_film(
         &mut self,
         below: &Below,
         (share, left): (&mut Vec3, &mut Vec3),
         specular: Vec3,
-        g: &GBuffer,
+        (albedo, metallic): (Vec3, f32),
         [white, bounces]: [f32; 2],
     ) {
         if self.coverage == 0.0 {
@@ -243,22 +243,22 @@ impl Layers {
         }
         let (mut dielectric, mut metal) = ([0.0; 3], [0.0; 3]);
         for cosine in facet_cosines(below.cos_view, below.alpha) {
-            if g.metallic < 1.0 {
+            if metallic < 1.0 {
                 let color = self.film.color(specular, cosine);
                 dielectric = each(|k| dielectric[k] + 0.25 * color[k]);
             }
-            if g.metallic > 0.0 {
-                let color = self.film.color(g.albedo, cosine);
+            if metallic > 0.0 {
+                let color = self.film.color(albedo, cosine);
                 metal = each(|k| metal[k] + 0.25 * color[k]);
             }
         }
-        self.metallic = g.metallic;
-        (self.dielectric, self.metal) = (specular, g.albedo);
+        self.metallic = metallic;
+        (self.dielectric, self.metal) = (specular, albedo);
         self.dielectric_more = dielectric.map(|c| 1.0 + c * bounces);
         self.metal_more = metal.map(|c| 1.0 + c * bounces);
         let of_dielectric = each(|k| white * (dielectric[k] * self.dielectric_more[k]));
         let of_metal = each(|k| white * (metal[k] * self.metal_more[k]));
-        *share = each(|k| mix(share[k], mix(of_dielectric[k], of_metal[k], g.metallic), self.coverage));
+        *share = each(|k| mix(share[k], mix(of_dielectric[k], of_metal[k], metallic), self.coverage));
         let greatest = most3(of_dielectric);
         *left = left.map(|c| mix(c, 1.0 - greatest, self.coverage));
     }

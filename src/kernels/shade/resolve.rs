@@ -11,7 +11,7 @@ use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::more;
 use crate::kernels::texture::sample::settle;
-use crate::kernels::vector::{Vec3, dot, each, most, most3, normalize, unpack4x8unorm, xyz};
+use crate::kernels::vector::{Vec3, dot, each, most, normalize, unpack4x8unorm, xyz};
 use crate::math::exact::{divide, square_root};
 use bricks::{Material, NORMAL, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use rayon::prelude::*;
@@ -50,13 +50,6 @@ pub(crate) fn footprint_of(params: &Params, ray: &Ray, t: f32, surface: &Surface
     let cosine = most(divide(dot(ray.direction, surface.normal).abs(), length), LEAST_COSINE);
     let width = divide(distance * params.step_y[3], cosine);
     divide(uv_area, most(surface.area, 1.0e-30)) * (width * width)
-}
-
-/// Of the base colour of a body that rays pass straight through, what they meet shows: they meet it less often than
-/// light enters it, and by as much it is brighter.
-fn beside_passing(m: &Material) -> f32 {
-    let passing = m.transmission * (1.0 - m.metallic) * most3(xyz(m.base_color));
-    if passing < 1.0 { (1.0 - m.transmission) / (1.0 - passing) } else { 0.0 }
 }
 
 /// Of all hits of the shaded set that have none yet. `mores`: of the same hits, or of none.
@@ -188,13 +181,8 @@ fn read(
     if is_turned {
         g.state |= GBUFFER_BACK;
     }
-    if material.flags & MATERIAL_REFRACTS != 0 {
-        if bound.has(PARAM_REFRACT) {
-            g.state |= GBUFFER_REFRACTS;
-        } else {
-            let share = beside_passing(material);
-            g.albedo = g.albedo.map(|c| c * share);
-        }
+    if material.flags & MATERIAL_REFRACTS != 0 && bound.has(PARAM_REFRACT) {
+        g.state |= GBUFFER_REFRACTS;
     }
     (g, more)
 }

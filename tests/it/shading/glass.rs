@@ -87,6 +87,58 @@ fn clear_glass_vanishes_in_a_uniform_environment() {
     }
 }
 
+/// Each half of a picture of a wall or body whose texture says how much passes is that of one without a texture. Light
+/// comes from behind and from before.
+#[test]
+fn as_much_passes_as_a_texture_says() {
+    let folder = common::folder();
+    let folder = folder.path();
+    let view = path(folder, "ahead", 3.0, [0.0, 0.0, 30.0], [0.0; 3]);
+    let square = |side: f32, z: f32| [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [side * x, side * y, z]);
+    // What the right and the left half let pass; alpha of the texture is of no use.
+    let [left, right] = [60u8, 255];
+    let texels = image::RgbaImage::from_fn(8, 8, |x, _| image::Rgba([if x < 4 { left } else { right }, 9, 0, 77]));
+    texels.save(folder.join("map.png")).expect("a texture");
+    let material = |share: f64, texture: &str, more: &str| {
+        format!(
+            r#"{{"doubleSided": true, "pbrMetallicRoughness": {{"metallicFactor": 0, "baseColorFactor": [0.6, 0.6, 0.6, 1]}},
+            "extensions": {{"KHR_materials_transmission": {{"transmissionFactor": {share} {texture}}} {more}}}}},
+            {}"#,
+            glow(3.0)
+        )
+    };
+    let texture = r#", "transmissionTexture": {"index": 0}"#;
+    // Light goes straight through this one, so that no half sees the other.
+    let body = r#", "KHR_materials_volume": {"thicknessFactor": 1}, "KHR_materials_ior": {"ior": 1}"#;
+    let specular = r#", "KHR_materials_specular": {"specularColorFactor": [1, 0.5, 0.5], "specularFactor": 0.75}"#;
+    let lights = "--sun 0.2,0.3,1 --sky-intensity 0.5 --spp 256 --seed 3";
+    for (what, more, solid, effects) in [
+        ("wall", specular, false, "primary,glossy"),
+        ("wall of paths", "", false, "path --bounces 2"),
+        ("body seen straight through", body, true, "primary,glossy"),
+        ("body", body, true, "path --bounces 3"),
+    ] {
+        let mut quads = if solid { cube() } else { vec![(square(1.0, 0.0), 0)] };
+        quads.push((square(3.0, -5.0), 1));
+        // Means of columns away from the middle.
+        let seen = |share: f64, texture: &str| {
+            let scene = converted(folder, "passing", &material(share, texture, more), &quads);
+            let found = &render(&scene, &view, &format!("{lights} --effects {effects}"))["R"];
+            [0..13, 19..32].map(|columns| {
+                let all = found.iter().enumerate().filter(|(i, _)| columns.contains(&(i % 32)));
+                all.map(|(_, &x)| f64::from(x)).sum::<f64>() / (32.0 * columns.len() as f64)
+            })
+        };
+        let found = seen(0.9, texture);
+        let expected = [seen(0.9 * f64::from(left) / 255.0, "")[0], seen(0.9 * f64::from(right) / 255.0, "")[1]];
+        println!("{what}: {found:?}, {expected:?}");
+        for (found, expected) in found.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 0.015 * expected, "{what}: {found} instead of {expected}");
+        }
+        assert!((expected[0] - expected[1]).abs() > 0.3 * expected[0], "control: {what}: {expected:?}");
+    }
+}
+
 /// A lamp of one side is black from behind, to the camera and to rays that go on; one of two sides is not.
 #[test]
 fn lamps_shine_to_their_front_alone() {

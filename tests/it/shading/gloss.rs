@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 
-/// A glTF file of quads, each of a material, converted. Corners go round; normals are the geometric ones.
+/// A glTF file of quads, each of a material, converted. Corners go round; normals are the geometric ones, texture
+/// coordinates (x + 1) / 2 and (y + 1) / 2. Texture 0 is the file `map.png` beside it.
 pub(super) fn converted(folder: &Path, name: &str, materials: &str, quads: &[([[f32; 3]; 4], usize)]) -> PathBuf {
     let mut bytes = Vec::new();
     let (mut views, mut accessors, mut primitives) = (Vec::new(), Vec::new(), Vec::new());
@@ -15,18 +16,26 @@ pub(super) fn converted(folder: &Path, name: &str, materials: &str, quads: &[([[
         let offset = bytes.len();
         let triangles = [0, 1, 2, 0, 2, 3].map(|k: usize| corners[k]);
         bytes.extend(triangles.iter().flatten().flat_map(|x| x.to_le_bytes()));
+        let uvs = triangles.iter().flat_map(|[x, y, _]| [x, y].map(|c| 0.5 * c + 0.5));
+        bytes.extend(uvs.flat_map(f32::to_le_bytes));
         views.push(format!(r#"{{"buffer": 0, "byteOffset": {offset}, "byteLength": 72}}"#));
+        views.push(format!(r#"{{"buffer": 0, "byteOffset": {}, "byteLength": 48}}"#, offset + 72));
         let (least, greatest) =
             ([0, 1, 2].map(|k| bound(corners, k, f32::min)), [0, 1, 2].map(|k| bound(corners, k, f32::max)));
         accessors.push(format!(
-            r#"{{"bufferView": {i}, "componentType": 5126, "count": 6, "type": "VEC3",
-            "min": {least:?}, "max": {greatest:?}}}"#
+            r#"{{"bufferView": {}, "componentType": 5126, "count": 6, "type": "VEC3",
+            "min": {least:?}, "max": {greatest:?}}}"#,
+            2 * i
         ));
-        primitives.push(format!(r#"{{"attributes": {{"POSITION": {i}}}, "material": {material}}}"#));
+        let view = 2 * i + 1;
+        accessors.push(format!(r#"{{"bufferView": {view}, "componentType": 5126, "count": 6, "type": "VEC2"}}"#));
+        let attributes = format!(r#"{{"POSITION": {}, "TEXCOORD_0": {view}}}"#, 2 * i);
+        primitives.push(format!(r#"{{"attributes": {attributes}, "material": {material}}}"#));
     }
     let text = format!(
         r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0}}],
         "extensionsUsed": ["KHR_materials_clearcoat", "KHR_materials_emissive_strength", "KHR_materials_volume"],
+        "images": [{{"uri": "map.png"}}], "textures": [{{"source": 0}}],
         "materials": [{materials}], "meshes": [{{"primitives": [{}]}}], "accessors": [{}], "bufferViews": [{}],
         "buffers": [{{"uri": "{name}.bin", "byteLength": {}}}]}}"#,
         primitives.join(","),

@@ -8,5 +8,6 @@ pub mod progress;
 #[path = "../../../tests/skip.rs"]
 mod skip;
 pub mod source;
+mod srgb;
 
 pub use bricks::pattern;

@@ -108,7 +108,7 @@ pub fn textured(tiled: bool) -> Arc<SceneFile> {
     };
     // Some wait for textures that the material has as well, some for tiles of their own.
     let further = |i: u32| bricks::Material {
-        base_color_texture: [bricks::NONE, 2, bricks::NONE, bricks::NONE][i as usize],
+        base_color_texture: [bricks::NONE, 2, bricks::NONE, 1][i as usize],
         normal_texture: [bricks::NONE, bricks::NONE, 1, 2][i as usize],
         metallic_roughness_texture: [bricks::NONE, 0, 1, 2][i as usize],
         occlusion_texture: [bricks::NONE, 2, 0, bricks::NONE][i as usize],

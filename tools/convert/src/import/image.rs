@@ -6,6 +6,7 @@ use super::panics::quietly;
 use crate::source::SourceTexture;
 use basisu::{DecodeFlags, TargetFormat, Transcoder};
 use image::ImageFormat;
+use std::borrow::Cow;
 
 /// Longest side of an image, in texels.
 const MAX_SIDE: u32 = bricks::MAX_TEXTURE_SIZE;
@@ -37,27 +38,33 @@ pub(super) fn decode_texture(bytes: &Bytes, name: String, wrap: u32) -> Result<S
 /// One image of channels of several, each the number of an image and the channel of that; white where there is none. It
 /// has the size of the largest; the others are interpolated.
 pub(super) fn pack(
-    images: Vec<SourceTexture>,
+    images: &[SourceTexture],
     channels: [Option<(usize, usize)>; 4],
     name: String,
     wrap: u32,
 ) -> SourceTexture {
     let width = images.iter().map(|image| image.width).max().unwrap_or(1);
     let height = images.iter().map(|image| image.height).max().unwrap_or(1);
-    let resized = |image: SourceTexture| {
-        if (image.width, image.height) == (width, height) {
-            return Some(image.rgba);
-        }
-        let image = image::RgbaImage::from_raw(image.width, image.height, image.rgba)?;
-        Some(image::imageops::resize(&image, width, height, image::imageops::FilterType::Triangle).into_raw())
+    let resized = |image: &SourceTexture| {
+        let texels = image::ImageBuffer::<image::Rgba<u8>, _>::from_raw(image.width, image.height, &image.rgba[..])?;
+        Some(image::imageops::resize(&texels, width, height, image::imageops::FilterType::Triangle).into_raw())
     };
-    let images: Vec<_> = images.into_iter().map(resized).collect();
     let mut rgba = vec![255; 4 * width as usize * height as usize];
-    for (to, channel) in channels.into_iter().enumerate() {
-        let Some((image, from)) = channel else { continue };
-        let Some(Some(texels)) = images.get(image) else { continue };
-        for (out, texel) in rgba.iter_mut().skip(to).step_by(4).zip(texels.iter().skip(from).step_by(4)) {
-            *out = *texel;
+    for (number, image) in images.iter().enumerate() {
+        let wanted = || channels.iter().enumerate().filter_map(|(to, channel)| Some((to, (*channel)?)));
+        let mut wanted = wanted().filter(|(_, (which, _))| *which == number).peekable();
+        if wanted.peek().is_none() {
+            continue;
+        }
+        let is_whole = (image.width, image.height) == (width, height);
+        let Some(texels) = (if is_whole { Some(Cow::Borrowed(&image.rgba)) } else { resized(image).map(Cow::Owned) })
+        else {
+            continue;
+        };
+        for (to, (_, from)) in wanted {
+            for (out, texel) in rgba.iter_mut().skip(to).step_by(4).zip(texels.iter().skip(from).step_by(4)) {
+                *out = *texel;
+            }
         }
     }
     SourceTexture { name, width, height, wrap, rgba }

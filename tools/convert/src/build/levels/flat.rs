@@ -5,7 +5,7 @@ use crate::build::texture::mips::Textures;
 use crate::build::texture::opacity::MaterialOpacity;
 use crate::build::texture::small::Small;
 use crate::build::triangles::attributes::{MeanColors, Wants};
-use bricks::{BASE_COLOR, MATERIAL_BLEND, MATERIAL_MASK, MATERIAL_MORE, Material, NONE};
+use bricks::{BASE_COLOR, MATERIAL_BLEND, MATERIAL_MASK, MATERIAL_MORE, MATERIAL_REFRACTS, Material, NONE};
 
 /// Where a texture is looked up under a triangle, as weights of its corners.
 const SAMPLES: [[f64; 3]; 4] = {
@@ -185,7 +185,9 @@ fn flattened(material: &Material, mean: &MeanColors, texture_means: &[[f32; 3]])
         emission: mean.emission,
         metallic: material.metallic * metal,
         roughness: material.roughness * rough,
-        flags: material.flags & !(MATERIAL_MASK | MATERIAL_BLEND | MATERIAL_MORE),
+        flags: material.flags & !(MATERIAL_MASK | MATERIAL_BLEND | MATERIAL_MORE | MATERIAL_REFRACTS),
+        transmission: 0.0,
+        absorption: 0,
         opacity_map: NONE,
         alpha_cutoff: Material::DIFFUSE.alpha_cutoff,
         uv_sets: 0,

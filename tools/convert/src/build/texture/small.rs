@@ -1,6 +1,6 @@
 //! Small copies of textures of colours, for what stands for textured triangles far away.
 
-use super::content::linear_of_srgb;
+use crate::srgb::linear_of_srgb;
 use crate::build::disk::journal::{WordReader, Words};
 use bricks::{WRAP_CLAMP, WRAP_MIRROR};
 

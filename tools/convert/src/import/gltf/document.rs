@@ -452,7 +452,7 @@ optional! {
     /// KHR_materials_transmission.
     Transmission {
         transmission_factor: f64,
-        transmission_texture: IgnoredAny,
+        transmission_texture: TextureInfo,
     }
     /// KHR_materials_volume.
     Volume {

@@ -9,16 +9,24 @@ use bricks::{
 /// A texture of a material, and the channel of it that becomes each of a pack; `None`: white.
 pub(super) type Pack<'a> = [Option<(&'a TextureInfo, usize)>; 4];
 
-/// The packs of a material, by their places; those of what it has not are empty.
-pub(super) fn packs<'a>(json: &'a Json, material: &Material, layers: &Layers) -> [Pack<'a>; MATERIAL_TEXTURES] {
+/// The packs of a material, by their places; those of what it has not are empty. `share`: the texture of what passes.
+pub(super) fn packs<'a>(
+    json: &'a Json,
+    material: &Material,
+    layers: &Layers,
+    share: Option<&'a TextureInfo>,
+) -> [Pack<'a>; MATERIAL_TEXTURES] {
     let extensions = &json.more.extensions;
     let mut packs = [[None; 4]; MATERIAL_TEXTURES];
+    let is_body = material.flags & MATERIAL_REFRACTS != 0;
+    if is_body {
+        packs[BASE_COLOR][3] = share.map(|info| (info, 0));
+    }
     let mut put = |place: usize, info: &'a Option<TextureInfo>, channels: &[(usize, usize)]| {
         let Some(info) = info else { return };
         channels.iter().for_each(|&(from, to)| packs[place][to] = Some((info, from)));
     };
     let rgb = [(0, 0), (1, 1), (2, 2)];
-    let is_body = material.flags & MATERIAL_REFRACTS != 0;
     if let Some(specular) = &extensions.specular
         && extensions.specular_glossiness.is_none()
         && !is_body
@@ -66,7 +74,8 @@ pub(super) fn infos(json: &Json) -> impl Iterator<Item = &TextureInfo> {
     let film = film.flat_map(|x| [&x.iridescence_texture, &x.iridescence_thickness_texture]);
     let anisotropy = extensions.anisotropy.iter().map(|x| &x.anisotropy_texture);
     let sheen = extensions.sheen.iter().flat_map(|x| [&x.sheen_color_texture, &x.sheen_roughness_texture]);
-    specular.chain(coat).chain(film).chain(anisotropy).chain(sheen).flatten()
+    let passing = extensions.transmission.iter().map(|x| &x.transmission_texture);
+    specular.chain(coat).chain(film).chain(anisotropy).chain(sheen).chain(passing).flatten()
 }
 
 /// The texture by whose coordinates tangents run where there is no normal texture.

@@ -4,14 +4,15 @@
 //!
 //! Filters of samplers are not kept: textures are averaged over what a pixel covers, whatever the sampler asks for.
 
-use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform, Volume};
+use super::document::{Document, Lenient, Material as Json, TextureInfo, TextureTransform};
 use super::file::{File, Problem, item};
 use super::further::{self, Pack};
 use super::names::label;
+use super::passing::{Changed, Passing};
 use crate::import::warnings::Warnings;
 use bricks::{
-    Layers, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_MORE, MATERIAL_REFRACTS, MATERIAL_TEXTURES,
-    MATERIAL_UNLIT, Material, NONE, NORMAL, pack_absorption,
+    BASE_COLOR, Layers, MATERIAL_BLEND, MATERIAL_DOUBLE_SIDED, MATERIAL_MASK, MATERIAL_MORE, MATERIAL_REFRACTS,
+    MATERIAL_TEXTURES, MATERIAL_UNLIT, Material, NONE, NORMAL,
 };
 use bricks::{WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT};
 use gltf::json::material::AlphaMode;
@@ -24,7 +25,7 @@ use std::collections::BTreeMap;
 const SETS: u32 = 2;
 
 /// Greatest index of refraction of a body; what none has.
-const MOST_INDEX: f64 = 100.0;
+pub(super) const MOST_INDEX: f64 = 100.0;
 
 /// An image and, in order, those to fall back to when it cannot be used; in range.
 pub(super) type Images = Vec<usize>;
@@ -34,8 +35,28 @@ pub(super) type Images = Vec<usize>;
 pub(super) enum Picture {
     /// An image.
     Whole(Images),
-    /// Of each channel an image and the channel of that; white where there is none. At least one is there.
-    Packed([Option<(Images, usize)>; 4]),
+    /// Of each channel an image and the channel of that; white where there is none. At least one image is there.
+    Packed {
+        /// Red, green, blue, alpha.
+        channels: [Option<(Images, usize)>; 4],
+        /// A transmission texture that changes them.
+        passing: Option<(Images, Passing, Changed)>,
+    },
+}
+
+impl Picture {
+    /// All images that it is made of.
+    pub fn images(&self) -> impl Iterator<Item = &Images> {
+        let (whole, packed) = match self {
+            Self::Whole(images) => (Some(images), None),
+            Self::Packed { channels, passing } => (None, Some((channels, passing))),
+        };
+        let packed = packed.into_iter().flat_map(|(channels, passing)| {
+            let channels = channels.iter().flatten().map(|(images, _)| images);
+            channels.chain(passing.iter().map(|(images, ..)| images))
+        });
+        whole.into_iter().chain(packed)
+    }
 }
 
 /// A picture with the way it is repeated.
@@ -49,11 +70,7 @@ pub(super) struct Texture {
 impl Texture {
     /// The image that names it.
     pub fn image(&self) -> usize {
-        let images = match &self.picture {
-            Picture::Whole(images) => Some(images),
-            Picture::Packed(channels) => channels.iter().flatten().map(|(images, _)| images).next(),
-        };
-        images.and_then(|images| images.first()).copied().unwrap_or_default()
+        self.picture.images().flatten().next().copied().unwrap_or_default()
     }
 }
 
@@ -164,11 +181,27 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> Ma
         let is_used = is_used[index];
         let place = || label("material", index, json.more.name.as_deref());
         let mut material = convert(json, warnings, &place);
+        let has_alpha = material.flags & MATERIAL_BLEND != 0;
+        let passing = Passing::of(json, &material, warnings, &place);
+        let share = passing.and_then(|_| passing_texture(document, json, warnings, &place));
+        if let Some(passing) = &passing {
+            passing.apply(json, &mut material, share.is_some(), warnings, &place);
+        }
         for (number, info) in infos(json).into_iter().enumerate() {
-            let Some(info) = info else { continue };
-            let Some((images, wrap)) = images(document, info.index, warnings, &place) else { continue };
-            if is_used {
-                let texture = Texture { picture: Picture::Whole(images), wrap };
+            let found = match passing {
+                Some(passing) if number == BASE_COLOR => {
+                    // Alpha of opaque things and of bodies says nothing.
+                    let alpha = (has_alpha && !passing.is_body).then_some(3);
+                    let pack = [Some(0), Some(1), Some(2), alpha].map(|channel| Some((info?, channel?)));
+                    let share = share.map(|share| (share, passing, Changed::Base));
+                    packed(document, pack, share, warnings, &place)
+                }
+                _ => info.and_then(|info| {
+                    let (images, wrap) = images(document, info.index, warnings, &place)?;
+                    Some((Texture { picture: Picture::Whole(images), wrap }, info))
+                }),
+            };
+            if let Some((texture, info)) = found.filter(|_| is_used) {
                 materials.put((&mut material, number), texture, info, warnings, &place);
             }
         }
@@ -178,9 +211,11 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> Ma
         if let Some(scale) = further::normal_scale(json) {
             more.normal_scale = scale;
         }
-        let packs = further::packs(json, &material, &layers);
+        let packs = further::packs(json, &material, &layers, share);
         for (number, pack) in packs.into_iter().enumerate() {
-            if let Some((texture, info)) = packed(document, pack, warnings, &place).filter(|_| is_used) {
+            let passing = passing.filter(|passing| number == BASE_COLOR && !passing.is_body);
+            let share = share.zip(passing).map(|(share, passing)| (share, passing, Changed::Specular));
+            if let Some((texture, info)) = packed(document, pack, share, warnings, &place).filter(|_| is_used) {
                 materials.put((&mut more, number), texture, info, warnings, &place);
             }
         }
@@ -228,29 +263,61 @@ impl Materials {
     }
 }
 
-/// A pack of channels that agree in their coordinates with the first; those that do not are left out. `None`: nothing
-/// of it can be used.
+/// A pack of channels that agree in their coordinates with the first, which is the transmission texture where one
+/// changes them; those that do not are left out. `None`: nothing of it can be used.
 fn packed<'a>(
     document: &Document,
     pack: Pack<'a>,
+    share: Option<(&'a TextureInfo, Passing, Changed)>,
     warnings: &mut Warnings,
     place: &dyn Fn() -> String,
 ) -> Option<(Texture, &'a TextureInfo)> {
     let mut channels = [const { None }; 4];
     let mut first = None;
+    let mut passing = None;
+    if let Some((info, of, changed)) = share {
+        let (images, wrap) = images(document, info.index, warnings, place)?;
+        first = Some((info, looks(info, wrap)));
+        passing = Some((images, of, changed));
+    }
     for (channel, given) in channels.iter_mut().zip(pack) {
         let Some((info, from)) = given else { continue };
         let Some((images, wrap)) = images(document, info.index, warnings, place) else { continue };
-        let looks = (set(info), rows(info), wrap);
-        let (_, expected) = first.get_or_insert((info, looks));
-        if *expected == looks {
+        let (_, expected) = first.get_or_insert((info, looks(info, wrap)));
+        if *expected == looks(info, wrap) {
             *channel = Some((images, from));
         } else {
             warnings.add("textures of one layer take different coordinates; the first used", place);
         }
     }
     let (info, (_, _, wrap)) = first?;
-    Some((Texture { picture: Picture::Packed(channels), wrap }, info))
+    Some((Texture { picture: Picture::Packed { channels, passing }, wrap }, info))
+}
+
+/// Where a texture is looked up.
+type Looks = (Option<usize>, Option<[[f32; 4]; 2]>, u32);
+
+fn looks(info: &TextureInfo, wrap: u32) -> Looks {
+    (set(info), rows(info), wrap)
+}
+
+/// The transmission texture, if it can be used and is looked up where the base colour is: rays pass by the alpha of both
+/// together.
+fn passing_texture<'a>(
+    document: &Document,
+    json: &'a Json,
+    warnings: &mut Warnings,
+    place: &dyn Fn() -> String,
+) -> Option<&'a TextureInfo> {
+    let info = json.more.extensions.transmission.as_ref()?.transmission_texture.as_ref()?;
+    let (_, wrap) = images(document, info.index, warnings, place)?;
+    let [base, ..] = infos(json);
+    let base = base.and_then(|base| Some((base, images(document, base.index, warnings, place)?.1)));
+    if base.is_some_and(|(base, of_base)| looks(base, of_base) != looks(info, wrap)) || set(info).is_none() {
+        warnings.add("transmission texture not looked up where the base colour is; factor used", place);
+        return None;
+    }
+    Some(info)
 }
 
 /// The factors and flags of a material.
@@ -290,11 +357,10 @@ fn convert(json: &Json, warnings: &mut Warnings, place: &dyn Fn() -> String) -> 
     }
     reflect(json, &mut material, warnings, place);
     coat(json, &mut material);
-    transmit(json, &mut material, warnings, place);
     material
 }
 
-fn unit(x: f64) -> f32 {
+pub(super) fn unit(x: f64) -> f32 {
     x.clamp(0.0, 1.0) as f32
 }
 
@@ -367,80 +433,6 @@ fn layers(json: &Json, material: &Material, warnings: &mut Warnings, place: &dyn
         }
     }
     layers
-}
-
-/// KHR_materials_transmission, of thin walls: rays pass straight through, whatever the roughness, and each is either
-/// let through or shaded.
-///
-/// Let t be the share transmitted, c the greatest component of the base colour, F the greatest of what is reflected
-/// along the normal. A share 1 - a = t c (1 - F) of the rays passes: alpha is multiplied by a, and what is shaded, seen
-/// by the share a, is made brighter so that along the normal it is as bright as it was: specular / a, and of the base
-/// colour the share that is not transmitted, (1 - t) / (1 - t c). Then surfaces reflect and transmit no more than they
-/// receive. What is lost is the tint of what is seen through.
-///
-/// Of a body (KHR_materials_volume with a thickness) alpha is the same, but colours are left as they are: where paths
-/// follow light through it they are needed so, and else shading does what is said above.
-fn transmit(json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
-    let Some(extension) = &json.more.extensions.transmission else { return };
-    let transmission = unit(extension.transmission_factor.unwrap_or(0.0));
-    if transmission == 0.0
-        || material.metallic == 1.0 && json.pbr_metallic_roughness.metallic_roughness_texture.is_none()
-    {
-        // Metal lets nothing through.
-        return;
-    }
-    if material.flags & MATERIAL_MASK != 0 {
-        warnings.add("transmission ignored beside alpha MASK", place);
-        return;
-    }
-    if extension.transmission_texture.is_some() {
-        warnings.add("transmission textures ignored; factor used", place);
-    }
-    let [r, g, b, _] = material.base_color;
-    let body = json.more.extensions.volume.as_ref().filter(|volume| volume.thickness_factor.is_some_and(|x| x > 0.0));
-    if body.is_none() && (r != g || g != b) {
-        warnings.add("transmitted light is not tinted", place);
-    }
-    let passing = transmission * (1.0 - material.metallic) * r.max(g).max(b);
-    let most = material.specular.into_iter().fold(0.0, f32::max);
-    let alpha = 1.0 - passing * (1.0 - most);
-    let rest = if passing < 1.0 { (1.0 - transmission) / (1.0 - passing) } else { 0.0 };
-    material.transmission = transmission;
-    if material.flags & MATERIAL_BLEND == 0 {
-        // Opaque materials have no alpha of their own.
-        material.base_color[3] = 1.0;
-        material.flags |= MATERIAL_BLEND;
-    }
-    if let Some(volume) = body {
-        if material.base_color[3] < 1.0 {
-            warnings.add("alpha ignored of a body that refracts", place);
-        }
-        material.base_color[3] = alpha;
-        refract(volume, json, material, warnings, place);
-        return;
-    }
-    material.base_color[..3].iter_mut().for_each(|c| *c *= rest);
-    material.base_color[3] *= alpha;
-    if alpha > 0.0 {
-        material.specular = material.specular.map(|c| (c / alpha).min(1.0));
-    }
-}
-
-/// What a body that refracts is: its index of refraction and its absorption (KHR_materials_ior, _volume).
-fn refract(volume: &Volume, json: &Json, material: &mut Material, warnings: &mut Warnings, place: &dyn Fn() -> String) {
-    let extensions = &json.more.extensions;
-    let index = extensions.ior.as_ref().and_then(|extension| extension.ior).unwrap_or(1.5).clamp(1.0, MOST_INDEX);
-    let along_normal = (((index - 1.0) / (index + 1.0)).powi(2)) as f32;
-    if material.specular != [along_normal; 3] || material.specular_weight != 1.0 {
-        warnings.add("KHR_materials_specular ignored of a body that refracts", place);
-        (material.specular, material.specular_weight) = ([along_normal; 3], 1.0);
-    }
-    if let Some(distance) = volume.attenuation_distance.filter(|distance| *distance > 0.0) {
-        let color = volume.attenuation_color.unwrap_or([1.0; 3]);
-        // Of what is black a thousandth is left, so that the packed absorptions of other colours keep their digits.
-        material.absorption = pack_absorption(color.map(|c| -c.clamp(1e-3, 1.0).ln() / distance));
-    }
-    material.flags |= MATERIAL_REFRACTS;
 }
 
 /// Images and wrap modes of a texture. `None`: it cannot be used, which is warned of.

@@ -28,6 +28,7 @@ mod meshes;
 mod meshopt;
 mod names;
 mod nodes;
+mod passing;
 
 use super::affine::{Affine, multiply};
 use super::bytes::{Bytes, Spool};
@@ -194,21 +195,24 @@ impl Parts for Gltf {
         let (name, texture) = &self.textures[index];
         match &texture.picture {
             Picture::Whole(images) => self.decode(images, name, texture.wrap),
-            Picture::Packed(channels) => {
+            Picture::Packed { channels, passing } => {
                 let mut read: Vec<(&Images, SourceTexture)> = Vec::new();
-                for (images, _) in channels.iter().flatten() {
+                for images in texture.picture.images() {
                     if read.iter().all(|(known, _)| *known != images) {
                         read.push((images, self.decode(images, name, texture.wrap)?));
                     }
                 }
-                let found = |channel: &Option<(Images, usize)>| {
-                    let (images, from) = channel.as_ref()?;
-                    let at = read.iter().position(|(known, _)| *known == images)?;
-                    Some((at, *from))
-                };
-                let channels = channels.each_ref().map(found);
-                let read = read.into_iter().map(|(_, texture)| texture).collect();
-                Ok(pack(read, channels, name.clone(), texture.wrap))
+                let place = |images: &Images| read.iter().position(|(known, _)| *known == images);
+                let channels =
+                    channels.each_ref().map(|channel| channel.as_ref().and_then(|(images, from)| Some((place(images)?, *from))));
+                let share = passing.as_ref().and_then(|(images, ..)| place(images));
+                let read: Vec<_> = read.into_iter().map(|(_, texture)| texture).collect();
+                let changing = share.map(|share| pack(&read, [Some((share, 0)), None, None, None], name.clone(), 0));
+                let mut packed = pack(&read, channels, name.clone(), texture.wrap);
+                if let (Some((_, passing, changed)), Some(changing)) = (passing, changing) {
+                    passing.change(*changed, &mut packed.rgba, &changing.rgba);
+                }
+                Ok(packed)
             }
         }
     }

@@ -342,6 +342,83 @@ fn further_textures_are_packed() {
     assert_eq!((sheen[0][3], sheen[3][3]), (40, 80));
 }
 
+/// Alpha and colours of a wall with a transmission texture are those of factors of what each texel lets pass.
+#[test]
+fn transmission_textures_are_in_alpha_and_colours() {
+    let wall = |factor: f64, texture: Value, mode: &str, more: Value| {
+        let mut material = json!({
+            "alphaMode": mode,
+            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 0.5], "metallicFactor": 0,
+                "baseColorTexture": {"index": 4}},
+            "extensions": {"KHR_materials_transmission": {"transmissionFactor": factor}}
+        });
+        if !texture.is_null() {
+            material["extensions"]["KHR_materials_transmission"]["transmissionTexture"] = texture;
+        }
+        for (name, extension) in more.as_object().unwrap() {
+            material["extensions"][name] = extension.clone();
+        }
+        with_images(material).scene()
+    };
+    let texels = |scene: &brickwalk_convert::source::SourceScene, index: u32| {
+        scene.textures[index as usize].rgba.as_chunks::<4>().0.to_vec()
+    };
+    let linear = |byte: u8| {
+        let x = f64::from(byte) / 255.0;
+        if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
+    };
+    // Texels of image 4; its red says what passes.
+    let image: Vec<[u8; 4]> = (0..8).map(|i| std::array::from_fn(|k| 100 + 4 * i + k as u8)).collect();
+    for (mode, own) in [("OPAQUE", 1.0), ("BLEND", 0.5)] {
+        let scene = wall(0.75, json!({"index": 4}), mode, json!({}));
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        let [material, further] = [scene.materials[0], scene.materials[1]];
+        assert_eq!((material.flags, further.flags), (MATERIAL_BLEND | MATERIAL_MORE, MATERIAL_FURTHER));
+        assert_eq!((material.base_color[3], material.transmission), (own, 0.75));
+        let (base, specular) =
+            (texels(&scene, material.base_color_texture), texels(&scene, further.base_color_texture));
+        for ((texel, base), specular) in image.iter().zip(&base).zip(&specular) {
+            let passing = 0.75 * f64::from(texel[0]) / 255.0;
+            let (plain, _) = material_of(passing);
+            let of_texture = if mode == "BLEND" { f64::from(texel[3]) / 255.0 } else { 1.0 };
+            let close = |found: f64, expected: f64, bound: f64| {
+                assert!((found - expected).abs() < bound, "{mode} {texel:?}: {found} is not {expected}");
+            };
+            close(f64::from(base[3]) / 255.0, of_texture * f64::from(plain.base_color[3]), 0.5 / 255.0 + 1e-6);
+            for k in 0..3 {
+                close(0.5 * linear(base[k]), linear(texel[k]) * f64::from(plain.base_color[k]), 2e-3);
+                let found = f64::from(material.specular[k]) * linear(specular[k]);
+                close(found, f64::from(plain.specular[k]), 1e-3);
+            }
+        }
+    }
+    // Opaque without a texture of what passes: alpha of the base colour says nothing.
+    let scene = wall(0.75, Value::Null, "OPAQUE", json!({}));
+    assert!(texels(&scene, scene.materials[0].base_color_texture).iter().all(|texel| texel[3] == 255));
+    // Bodies keep their colours, and know what passes.
+    let scene = wall(1.0, json!({"index": 4}), "OPAQUE", json!({"KHR_materials_volume": {"thicknessFactor": 1}}));
+    let [body, further] = [scene.materials[0], scene.materials[1]];
+    assert_eq!((body.flags, body.base_color[3]), (MATERIAL_BLEND | MATERIAL_REFRACTS | MATERIAL_MORE, 1.0));
+    let (base, share) = (texels(&scene, body.base_color_texture), texels(&scene, further.base_color_texture));
+    for ((texel, base), share) in image.iter().zip(&base).zip(&share) {
+        let alpha = 255.0 * (1.0 - 0.5 * 0.96 * f64::from(texel[0]) / 255.0);
+        assert!(base[..3] == texel[..3] && (f64::from(base[3]) - alpha).abs() < 0.501, "{base:?}, {alpha}");
+        assert_eq!(*share, [255, 255, 255, texel[0]]);
+    }
+    // Where the base colour has other coordinates the factor stands for it.
+    let scene = wall(0.75, json!({"index": 4, "texCoord": 1}), "OPAQUE", json!({}));
+    assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("factor used"), "{:?}", scene.warnings);
+    assert!(scene.materials.len() == 1 && scene.materials[0].base_color[3] < 0.7);
+}
+
+/// A wall of tone 0.5 without textures.
+fn material_of(transmission: f64) -> (Material, Vec<String>) {
+    material(json!({
+        "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0},
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": transmission}}
+    }))
+}
+
 #[test]
 fn coats_over_bumps_have_normals_of_their_own() {
     let coated = |more: Value| {
