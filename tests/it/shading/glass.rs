@@ -104,7 +104,7 @@ fn as_much_passes_as_a_texture_says() {
             r#"{{"doubleSided": true, "pbrMetallicRoughness": {{"metallicFactor": 0, "baseColorFactor": [0.6, 0.6, 0.6, 1]}},
             "extensions": {{"KHR_materials_transmission": {{"transmissionFactor": {share} {texture}}} {more}}}}},
             {}"#,
-            glow(3.0)
+            glow(12.0)
         )
     };
     let texture = r#", "transmissionTexture": {"index": 0}"#;
