@@ -130,11 +130,12 @@ impl Material {
     }
 
     /// What follows a material with [`MATERIAL_MORE`]: five textures, with their places and sets of coordinates as
-    /// those of any material. They multiply its factors:
+    /// those of any material. They multiply its factors. Of a body that refracts the first has alpha alone: the share
+    /// that is transmitted. Of others:
     ///
     /// | place | texture |
     /// | --- | --- |
-    /// | base colour | sRGB: what the dielectric part reflects; alpha: its weight (KHR_materials_specular). Of a body that refracts, alpha alone: what it transmits |
+    /// | base colour | sRGB: what the dielectric part reflects; alpha: its weight (KHR_materials_specular) |
     /// | normal | linear: of the clear coat; without one it has that of the surface before its normal texture |
     /// | metallic-roughness | linear: clear coat, its roughness, share of the film, its thickness |
     /// | occlusion | linear: direction of the anisotropy, 2 rg - 1, and its strength |

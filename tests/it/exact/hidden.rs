@@ -88,7 +88,8 @@ fn rays_meet_what_brute_force_meets_of_the_nodes_that_are_left() {
         let with = |options: &str| {
             // Out of core on the processor alone: rounds of queries take long on software Vulkan.
             let cache = if adapter == "cpu" { "30%" } else { "100%" };
-            let mut settings = settings(&format!("{options} --cache {cache}"));
+            // As many pixels as rays, and a few more.
+            let mut settings = settings(&format!("{options} --cache {cache} --size 64x48"));
             settings.set("adapter", &adapter).expect("an adapter");
             settings
         };

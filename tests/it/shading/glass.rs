@@ -94,7 +94,8 @@ fn as_much_passes_as_a_texture_says() {
     let folder = common::folder();
     let folder = folder.path();
     let view = path(folder, "ahead", 3.0, [0.0, 0.0, 30.0], [0.0; 3]);
-    let square = |side: f32, z: f32| [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [side * x, side * y, z]);
+    let square =
+        |side: f32, z: f32| [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| [side * x, side * y, z]);
     // What the right and the left half let pass; alpha of the texture is of no use.
     let [left, right] = [60u8, 255];
     let texels = image::RgbaImage::from_fn(8, 8, |x, _| image::Rgba([if x < 4 { left } else { right }, 9, 0, 77]));

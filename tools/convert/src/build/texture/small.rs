@@ -1,7 +1,7 @@
 //! Small copies of textures of colours, for what stands for textured triangles far away.
 
-use crate::srgb::linear_of_srgb;
 use crate::build::disk::journal::{WordReader, Words};
+use crate::srgb::linear_of_srgb;
 use bricks::{WRAP_CLAMP, WRAP_MIRROR};
 
 /// Texels of a small copy each way, at most.

@@ -203,8 +203,9 @@ impl Parts for Gltf {
                     }
                 }
                 let place = |images: &Images| read.iter().position(|(known, _)| *known == images);
-                let channels =
-                    channels.each_ref().map(|channel| channel.as_ref().and_then(|(images, from)| Some((place(images)?, *from))));
+                let channels = channels
+                    .each_ref()
+                    .map(|channel| channel.as_ref().and_then(|(images, from)| Some((place(images)?, *from))));
                 let share = passing.as_ref().and_then(|(images, ..)| place(images));
                 let read: Vec<_> = read.into_iter().map(|(_, texture)| texture).collect();
                 let changing = share.map(|share| pack(&read, [Some((share, 0)), None, None, None], name.clone(), 0));
