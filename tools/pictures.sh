@@ -3,20 +3,30 @@
 # beside Sponza where its folder is given, and puts them on one sheet. Half an hour on two cores, and an hour with
 # SCENES. Pictures that are there are not made twice.
 #
-#   tools/pictures.sh DIR [SCENES]
+#   tools/pictures.sh DIR [SCENES [PART…]]
 #
-# DIR keeps scenes and pictures. It gets pictures.jpg, and window.jpg where there are Xvfb, openbox, import and convert.
-# SCENES is a folder with sponza/Sponza.gltf and env/, for sponza.jpg, Sponza under six lights, and study.jpg, plots of
-# a study of it, which take chromium. It needs python3 with pillow.
+# DIR keeps scenes and pictures. SCENES is a folder with sponza/Sponza.gltf and env/. All of it takes python3 with
+# pillow. The parts, of which all are made by default:
+#
+#   sheet   pictures.jpg
+#   window  window.jpg, where there are Xvfb, openbox, import and convert
+#   lights  sponza.jpg, Sponza under six lights, with SCENES
+#   study   study.jpg, plots of a study of it, with SCENES and chromium
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd)
 brickwalk=${BRICKWALK:-$root/target/release/brickwalk}
-[ $# -ge 1 ] || { echo "usage: tools/pictures.sh DIR [SCENES]" >&2; exit 2; }
+[ $# -ge 1 ] || { echo "usage: tools/pictures.sh DIR [SCENES [PART…]]" >&2; exit 2; }
 [ -x "$brickwalk" ] || { echo "$brickwalk is not there: build with cargo build --release" >&2; exit 1; }
 mkdir -p "$1"
 out=$(cd -- "$1" && pwd)
+scenes=${2:-}
+parts=" ${*:3} "
+[ $# -ge 3 ] || parts=" sheet window lights study "
 size=${SIZE:-1280x720}
+
+wants() { [[ $parts == *" $1 "* ]]; }
+has() { command -v "$1" >/dev/null; }
 
 # A picture: its name, the scene, the camera path, and more options.
 picture() {
@@ -32,22 +42,29 @@ generated() {
     [ -e "$out/$1.bricks" ] || "$brickwalk" scene "$1" --triangles "$2" --quiet -o "$out/$1.bricks"
 }
 
-generated city 4M
-picture city "$out/city.bricks" "$root/docs/city.json" --sun 0.7,0.5,0.5
-generated pipes 4M
-picture plant "$out/pipes.bricks" "$out/pipes.near.json"
-generated terrain 4M
-picture woods "$out/terrain.bricks" "$out/terrain.near.json" --sun -0.6,0.5,0.4
-generated stadium 4M
-picture stadium "$out/stadium.bricks" "$out/stadium.near.json" --sun 0.5,0.45,0.6
-if [ $# -ge 2 ]; then
-    [ -e "$out/sponza.bricks" ] || "$brickwalk" convert "$2/sponza/Sponza.gltf" --quiet -o "$out/sponza.bricks"
-    picture sponza "$out/sponza.bricks" "$root/paths/sponza_3.json" --sun 0.3,1,0.06
-fi
+sponza() {
+    [ -e "$out/sponza.bricks" ] || "$brickwalk" convert "$scenes/sponza/Sponza.gltf" --quiet -o "$out/sponza.bricks"
+}
+
+pictures() {
+    generated city 4M
+    picture city "$out/city.bricks" "$root/docs/city.json" --sun 0.7,0.5,0.5
+    generated pipes 4M
+    picture plant "$out/pipes.bricks" "$out/pipes.near.json"
+    generated terrain 4M
+    picture woods "$out/terrain.bricks" "$out/terrain.near.json" --sun -0.6,0.5,0.4
+    generated stadium 4M
+    picture stadium "$out/stadium.bricks" "$out/stadium.near.json" --sun 0.5,0.45,0.6
+    if [ -n "$scenes" ]; then
+        sponza
+        picture sponza "$out/sponza.bricks" "$root/paths/sponza_3.json" --sun 0.3,1,0.06
+    fi
+}
 
 # The window over the city, once it rests.
 window() {
     local display=:97 server view
+    generated city 4M
     Xvfb $display -screen 0 1280x800x24 2>/dev/null &
     server=$!
     sleep 2
@@ -62,27 +79,41 @@ window() {
     convert "$out/window.png" -quality 88 "$out/window.jpg"
 }
 
-has() { command -v "$1" >/dev/null; }
-if [ ! -e "$out/window.jpg" ] && has Xvfb && has openbox && has import && has convert; then
+# Sponza under six lights.
+lights() {
+    local lights=$out/lights
+    sponza
+    mkdir -p "$lights"
+    [ -e "$lights/sponza.bricks" ] || ln -s "$out/sponza.bricks" "$lights/sponza.bricks"
+    python3 "$root/tools/contact_sheet.py" --scenes "$scenes" --brickwalk "$brickwalk" -o "$lights"
+    cp "$lights/sheet.jpg" "$out/sponza.jpg"
+}
+
+# Error over time of two effects in Sponza.
+study() {
+    local effect
+    sponza
+    for effect in ao diffuse; do
+        "$brickwalk" study "$out/sponza.bricks" -o "$out/study-$effect" --path "$root/paths/sponza.json" \
+            --effects "$effect" --caches 100 --views 1 --size 320x180 --budget 15 --quiet
+    done
+    python3 "$root/tools/study_picture.py" -o "$out/study.jpg" \
+        "$out/study-ao/report.html#FLIP over time: ao, cache 100 %, warm" \
+        "$out/study-diffuse/report.html#FLIP over time: diffuse, cache 100 %, warm"
+}
+
+if wants window && [ ! -e "$out/window.jpg" ] && has Xvfb && has openbox && has import && has convert; then
     echo "window"
     window
 fi
-if [ $# -ge 2 ]; then
-    lights=$out/lights
-    mkdir -p "$lights"
-    [ -e "$lights/sponza.bricks" ] || ln -s "$out/sponza.bricks" "$lights/sponza.bricks"
-    python3 "$root/tools/contact_sheet.py" --scenes "$2" --brickwalk "$brickwalk" -o "$lights"
-    cp "$lights/sheet.jpg" "$out/sponza.jpg"
-    if has chromium; then
-        for effect in ao diffuse; do
-            "$brickwalk" study "$out/sponza.bricks" -o "$out/study-$effect" --path "$root/paths/sponza.json" \
-                --effects "$effect" --caches 100 --budget 25 --quiet
-        done
-        python3 "$root/tools/study_picture.py" -o "$out/study.jpg" \
-            "$out/study-ao/report.html#FLIP over time: ao, cache 100 %, warm" \
-            "$out/study-diffuse/report.html#FLIP over time: diffuse, cache 100 %, warm"
-    fi
+if wants lights && [ -n "$scenes" ]; then
+    lights
 fi
+if wants study && [ -n "$scenes" ] && has chromium; then
+    study
+fi
+wants sheet || exit 0
+pictures
 
 python3 - "$out" <<'SHEET'
 import pathlib

@@ -4,7 +4,8 @@ use super::bounded::{Computed, bounded, bytes};
 use super::decode::{DecodedBrick, decode, decode_levels};
 use super::scenes::*;
 use bricks::{
-    Layers, Level, MATERIAL_FURTHER, MATERIAL_LAYERS, MATERIAL_MASK, MATERIAL_MORE, Material, NONE, Resident,
+    Layers, Level, MATERIAL_BLEND, MATERIAL_FURTHER, MATERIAL_LAYERS, MATERIAL_MASK, MATERIAL_MORE, MATERIAL_REFRACTS,
+    Material, NONE, Resident, pack_absorption,
 };
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::progress::Progress;
@@ -599,6 +600,26 @@ fn layers_are_kept_without_their_textures() {
     assert!(seen > 1 && material.flags & (MATERIAL_LAYERS | MATERIAL_MORE) == MATERIAL_LAYERS);
     assert_eq!(material.layers(), resident.materials[0].layers());
     assert_eq!(resident.materials[1].flags, MATERIAL_FURTHER);
+}
+
+/// What stands for bodies that refract lets nothing pass.
+#[test]
+fn bodies_that_refract_are_opaque_from_afar() {
+    let mut scene = two_coloured(255);
+    scene.materials[0] = Material {
+        flags: MATERIAL_BLEND | MATERIAL_REFRACTS,
+        transmission: 0.5,
+        absorption: pack_absorption([0.5, 0.25, 1.0]),
+        specular: [0.04; 3],
+        specular_weight: 1.0,
+        ..scene.materials[0]
+    };
+    // Reading a file checks its materials.
+    let (resident, bricks) = decode_levels(&built(&scene, &with_levels(500)).path());
+    let seen = bricks.last().unwrap().triangle(0).material;
+    let material = &resident.materials[seen as usize];
+    assert!(seen > 0 && (material.flags, material.transmission, material.absorption) == (0, 0.0, 0));
+    assert_eq!(resident.materials[0].flags, MATERIAL_BLEND | MATERIAL_REFRACTS);
 }
 
 #[test]
