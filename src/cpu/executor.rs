@@ -71,6 +71,8 @@ pub struct CpuExecutor {
     buffers: Buffers,
     binary: Option<BinaryTrees>,
     extent: Extent,
+    /// What of it this frame takes.
+    rows: Extent,
     view: Params,
     directions: Directions,
     tuning: Tuning,
@@ -110,6 +112,7 @@ impl CpuExecutor {
             },
             binary: None,
             extent,
+            rows: extent,
             view: Params::default(),
             directions: Directions::default(),
             tuning: Tuning::new(&setup),
@@ -123,7 +126,7 @@ impl CpuExecutor {
 
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
-        let extent = self.extent;
+        let extent = self.rows;
         Params {
             zero: 0,
             width: extent.width,
@@ -330,7 +333,7 @@ impl FrameExecutor for CpuExecutor {
 
     fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError> {
         let has_bounces = !self.buffers.sets[2].rays.is_empty();
-        self.extent = extent;
+        (self.extent, self.rows) = (extent, extent);
         self.buffers.sets = [extent.rays(), extent.rays(), 0].map(RaySet::new);
         let has_more = !self.buffers.pixels.mores[0].is_empty();
         self.buffers.pixels = Pixels::new(extent.rays(), has_more);
@@ -342,7 +345,7 @@ impl FrameExecutor for CpuExecutor {
     }
 
     fn allow_bounces(&mut self) {
-        self.buffers.sets[2] = RaySet::new(self.extent.rays());
+        self.buffers.sets[2] = RaySet::new(self.rows.rays());
         self.buffers.pixels.allow_bounces();
     }
 
@@ -403,10 +406,17 @@ impl FrameExecutor for CpuExecutor {
         self.lamps.rebase(view.frame);
         self.view = view.params;
         self.directions = view.directions;
+        let rows = self.extent.first(view.rays);
+        if rows != self.rows {
+            self.rows = rows;
+            self.buffers.sets.iter_mut().filter(|set| !set.rays.is_empty()).for_each(|set| set.resize(rows.rays()));
+            self.buffers.pixels.resize(rows.rays());
+            self.buffers.tiles = TileLists::new(rows.tiles() as usize);
+        }
     }
 
     fn set_rays(&mut self, pass: Pass, rays: &[layout::Ray]) {
-        self.buffers.sets[pass.set()].rays = padded(rays, self.extent.rays());
+        self.buffers.sets[pass.set()].rays = padded(rays, self.rows.rays());
     }
 
     fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {

@@ -69,7 +69,7 @@ pub fn camera_view(
         refracts: effects.refracts(),
         shares: effects.environment && light.lamps.environment.is_some() && effects.diffuse.is_some(),
     };
-    View { frame, params, directions }
+    View { frame, params, directions, rays: None }
 }
 
 #[cfg(test)]

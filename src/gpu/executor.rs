@@ -51,6 +51,8 @@ pub struct GpuExecutor {
     /// Of families that nothing is made of: nothing.
     unheld: Option<Box<dyn Any>>,
     extent: Extent,
+    /// What of it this frame takes.
+    rows: Extent,
     /// Of every submission.
     readback: Readback,
     /// Of whole buffers.
@@ -142,6 +144,7 @@ impl GpuExecutor {
             families: Vec::new(),
             unheld: None,
             extent,
+            rows: extent,
             readback,
             whole,
             timing,
@@ -176,9 +179,7 @@ impl GpuExecutor {
 
     /// The G-buffer of a set, without the half that keeps further textures.
     fn gbuffer_of(&mut self, set: usize) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        let mut all = self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[set])?;
-        all.truncate(if self.has_more() { all.len() / 2 } else { all.len() });
-        Ok(all)
+        self.whole.first(&self.gpu, &self.buffers.pixels.gbuffers[set], self.rows.rays())
     }
 
     fn rebind(&mut self) {
@@ -187,7 +188,7 @@ impl GpuExecutor {
 
     /// The parameters of all dispatches of a submission.
     fn params(&self) -> Params {
-        let extent = self.extent;
+        let extent = self.rows;
         Params {
             zero: 0,
             width: extent.width,
@@ -228,7 +229,7 @@ impl GpuExecutor {
         if dispatches.iter().any(|dispatch| dispatch.kernel == names::count_pairs) {
             self.make_room_for_counts()?;
         }
-        let rays = self.extent.rays();
+        let rays = self.rows.rays();
         let asks_for_stand_ins = dispatches.iter().any(|dispatch| dispatch.kernel == names::query_stand_ins);
         if asks_for_stand_ins {
             self.make_room_for_pair_rays(rays as u64);
@@ -351,7 +352,7 @@ impl GpuExecutor {
 
     /// Makes room for the counts of how many rays of each tile see each leaf.
     fn make_room_for_counts(&mut self) -> Result<(), ExecutorError> {
-        let (tiles, leaves) = (self.extent.tiles(), self.scene.resident().leaves.len());
+        let (tiles, leaves) = (self.rows.tiles(), self.scene.resident().leaves.len());
         let pairs = u64::from(tiles) * leaves as u64;
         if 4 * pairs > self.gpu.limits.max_storage_buffer_binding_size {
             return Err(report::too_many_pairs(tiles, leaves));
@@ -398,7 +399,7 @@ impl FrameExecutor for GpuExecutor {
         check_extent(&self.gpu, extent)?;
         let rays = extent.rays();
         let bounces = if self.has_bounces { rays } else { 0 };
-        self.extent = extent;
+        (self.extent, self.rows) = (extent, extent);
         self.buffers.sets = [rays, rays, bounces].map(|rays| RayBuffers::new(&self.gpu, rays));
         self.buffers.pixels = PixelBuffers::new(&self.gpu, (rays, bounces), self.has_more());
         self.buffers.tiles = TileBuffers::new(&self.gpu, extent, self.buffers.tiles.capacity);
@@ -507,23 +508,24 @@ impl FrameExecutor for GpuExecutor {
         self.buffers.lamps.rebase(&self.gpu, view.frame);
         self.view = view.params;
         self.directions = view.directions;
+        self.rows = self.extent.first(view.rays);
     }
 
     fn set_rays(&mut self, pass: Pass, rays: &[layout::Ray]) {
-        let all = padded(rays, self.extent.rays());
+        let all = padded(rays, self.rows.rays());
         self.gpu.queue.write_buffer(&self.buffers.sets[pass.set()].rays, 0, bytemuck::cast_slice(&all));
     }
 
     fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.whole.read(&self.gpu, &self.buffers.sets[pass.set()].rays)
+        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].rays, self.rows.rays())
     }
 
     fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.whole.read(&self.gpu, &self.buffers.sets[pass.set()].hits)
+        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].hits, self.rows.rays())
     }
 
     fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.whole.read(&self.gpu, &self.buffers.sets[pass.set()].surfaces)
+        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].surfaces, self.rows.rays())
     }
 
     fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {
@@ -531,7 +533,7 @@ impl FrameExecutor for GpuExecutor {
     }
 
     fn read_radiance(&mut self) -> Result<Vec<[f32; 4]>, ExecutorError> {
-        self.whole.read(&self.gpu, &self.buffers.pixels.radiance)
+        self.whole.first(&self.gpu, &self.buffers.pixels.radiance, self.rows.rays())
     }
 }
 

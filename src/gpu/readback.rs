@@ -50,15 +50,25 @@ impl Readback {
     /// # Errors
     /// The device's.
     pub fn read<T: Pod>(&mut self, gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<T>, ExecutorError> {
+        self.first(gpu, source, source.size() as usize / size_of::<T>())
+    }
+
+    /// Reads so many elements from the start of a buffer, or all that it has, as [`Self::read`] does.
+    ///
+    /// # Errors
+    /// The device's.
+    pub fn first<T: Pod>(&mut self, gpu: &Gpu, source: &wgpu::Buffer, count: usize) -> Result<Vec<T>, ExecutorError> {
+        // Copies are made of words.
+        let size = ((count * size_of::<T>()) as u64).next_multiple_of(4).min(source.size());
         // Of whole elements, and of words, which copies are made of.
         let piece = PIECE / (4 * size_of::<T>() as u64) * (4 * size_of::<T>() as u64);
-        if self.buffer.size() < source.size().min(piece) {
-            self.buffer = mappable(gpu, source.size().min(piece));
+        if self.buffer.size() < size.min(piece) {
+            self.buffer = mappable(gpu, size.min(piece));
         }
-        let mut all = Vec::with_capacity(source.size() as usize / size_of::<T>());
+        let mut all = Vec::with_capacity(size as usize / size_of::<T>());
         let mut at = 0;
-        while at < source.size() {
-            let bytes = (source.size() - at).min(piece);
+        while at < size {
+            let bytes = (size - at).min(piece);
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             encoder.copy_buffer_to_buffer(source, at, &self.buffer, 0, bytes);
             gpu.queue.submit([encoder.finish()]);

@@ -24,6 +24,13 @@ impl RaySet {
         }
     }
 
+    /// For so many rays; those beyond are forgotten.
+    pub fn resize(&mut self, rays: usize) {
+        self.rays.resize(rays, Ray::default());
+        self.hits.resize(rays, Hit::default());
+        self.surfaces.resize(rays, Surface::default());
+    }
+
     /// How far a ray went to its hit, device units.
     pub fn way(&self, index: usize) -> f32 {
         let d = self.rays[index].direction;

@@ -30,6 +30,12 @@ impl Extent {
     pub fn tiles(&self) -> u32 {
         self.tiles_x() * self.height.div_ceil(self.tile)
     }
+
+    /// Its first rows, as many as hold so many rays; all of it for `None`.
+    pub fn first(&self, rays: Option<usize>) -> Self {
+        let rows = rays.map_or(self.height, |rays| rays.div_ceil(self.width as usize).try_into().unwrap_or(u32::MAX));
+        Self { height: rows.clamp(1, self.height), ..*self }
+    }
 }
 
 /// How an executor is set up.
@@ -166,4 +172,7 @@ pub struct View {
     pub params: Params,
     /// Directions of the passes that start at hits.
     pub directions: Directions,
+    /// Rays of its passes, from outside, where they are fewer than the extent holds: kernels then run over the rows that
+    /// hold them, and nothing of others can be read.
+    pub rays: Option<usize>,
 }

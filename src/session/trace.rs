@@ -194,7 +194,7 @@ pub fn trace_device(
     let pass = if any { Pass::Shadow(Lamp::Sun) } else { Pass::Primary };
     let (executor, cache) = (&mut *traced.executor, &mut *traced.cache);
     let directions = Directions { lod: traced.lod, ..Directions::default() };
-    executor.begin_frame(&View { frame: *frame, params: Params::default(), directions });
+    executor.begin_frame(&View { frame: *frame, params: Params::default(), directions, rays: Some(rays.len()) });
     executor.set_rays(pass, rays);
     cache.begin_pass("trace", 0);
     let tracing = &Tracing::default();

@@ -94,7 +94,7 @@ fn trace(
         Setup { extent: EXTENT, threshold: 0, count: false, opaque: false, hides: false, keep: Keep::default() };
     let (gpu, kernels) = (executor.gpu().clone(), executor.kernels().clone());
     let mut executor = GpuExecutor::with_kernels(gpu, kernels, scene, workers, &page_sizes, setup)?;
-    executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
+    executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default(), rays: None });
     let mut found = [Vec::new(), Vec::new()];
     for (any, pass) in [Pass::Primary, Pass::Shadow(Lamp::Sun)].into_iter().enumerate() {
         for (names, by, list_most, is_cold) in WAYS {

@@ -45,6 +45,20 @@ impl Pixels {
         Self { gbuffers, mores, radiance: vec![[0.0; 4]; rays], throughput: Vec::new(), densities: Vec::new() }
     }
 
+    /// For so many pixels; those beyond are forgotten.
+    pub fn resize(&mut self, rays: usize) {
+        fn resize<T: Copy + Default>(all: &mut Vec<T>, rays: usize) {
+            if !all.is_empty() {
+                all.resize(rays, T::default());
+            }
+        }
+        self.gbuffers.iter_mut().for_each(|all| resize(all, rays));
+        self.mores.iter_mut().for_each(|all| resize(all, rays));
+        resize(&mut self.radiance, rays);
+        resize(&mut self.throughput, rays);
+        resize(&mut self.densities, rays);
+    }
+
     /// What is kept of the hits of a set.
     pub fn of_set(&mut self, set: usize) -> (&mut [GBuffer], &mut [More]) {
         (&mut self.gbuffers[set], &mut self.mores[set])

@@ -276,7 +276,7 @@ impl Stage {
 
     /// Begins a frame that has no rays of its own.
     pub fn begin_frame(&mut self) {
-        let view = View { frame: self.frame, params: Params::default(), directions: Directions::default() };
+        let view = View { frame: self.frame, params: Params::default(), directions: Directions::default(), rays: None };
         self.opened.executor.begin_frame(&view);
     }
 

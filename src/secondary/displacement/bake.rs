@@ -159,7 +159,7 @@ fn trace(
     bricks.dedup();
     let frame = placed[runs[0].job].frame;
     let (executor, cache) = (&mut *bench.executor, &mut *bench.cache);
-    executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
+    executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default(), rays: None });
     executor.set_rays(Pass::Primary, &rays);
     cache.begin_pass("displacement", 0);
     let stats = &mut Counters::default();

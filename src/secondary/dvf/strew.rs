@@ -112,7 +112,7 @@ struct State {
 
 /// What a frame of its own is seen from.
 fn view(frame: Frame, seed: u32) -> View {
-    View { frame, params: Params { seed, ..Params::default() }, directions: Directions::default() }
+    View { frame, params: Params { seed, ..Params::default() }, directions: Directions::default(), rays: None }
 }
 
 impl<'a> Strewing<'a> {

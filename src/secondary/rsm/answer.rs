@@ -200,7 +200,7 @@ fn lamp_view(engine: &Engine, lamp: &LampView, frame: Frame) -> View {
         seed: engine.settings.seed,
         ..Params::default()
     };
-    View { frame, params, directions: Directions::default() }
+    View { frame, params, directions: Directions::default(), rays: None }
 }
 
 /// Traces rays that were given, which have nothing in common with the frame before.

@@ -7,8 +7,10 @@ use brickwalk::kernels::frame::Frame;
 use brickwalk::kernels::layout::NONE;
 use brickwalk::output::npy::{Hit, Ray};
 use brickwalk::reference::{Tally, Truth, TruthRay, judge};
+use brickwalk::schedule::Pass;
+use brickwalk::session::Session;
 use brickwalk::session::opened::{Opened, open_scene};
-use brickwalk::session::trace::{approach, device_ray, find, for_rays, trace, trace_device};
+use brickwalk::session::trace::{EXTENT, approach, device_ray, find, for_rays, trace, trace_device};
 use brickwalk::settings::Group;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -135,6 +137,39 @@ fn distances_and_hits_are_those_of_f64_from_any_distance() {
             let others = hits.iter().zip(&plain).filter(|(hit, plain)| hit.triangle != plain.id).count();
             assert!(distance < 1e9 || others * 2 > rays.len(), "{place}: control: {others} other triangles");
         }
+    }
+}
+
+/// Few rays take few rows of the block; many ones after them have all of theirs, and pictures are what they were.
+#[test]
+fn few_rays_take_few_rows() {
+    let folder = folder();
+    let scene = made(folder.path(), hills());
+    for adapter in adapters() {
+        let (file, mut opened) = opened(&scene, &adapter);
+        let truth = Truth::load(&file).expect("truth");
+        let rays = aimed(&truth, 10.0, 3000);
+        let many = trace(&mut opened.traced(), &rays, false, &mut |_| ()).expect("hits").0;
+        for count in [70, 1, 33] {
+            let few = trace(&mut opened.traced(), &rays[..count], false, &mut |_| ()).expect("hits").0;
+            assert!(few == many[..count], "{adapter}: {count} rays");
+            let rows = opened.executor.read_hits(Pass::Primary).expect("hits").len() / EXTENT.width as usize;
+            assert!(rows <= count.div_ceil(32), "{adapter}: {count} rays took {rows} rows");
+        }
+        let again = trace(&mut opened.traced(), &rays, false, &mut |_| ()).expect("hits").0;
+        assert!(again == many, "{adapter}: many rays after few");
+
+        let mut settings = common::settings("--size 40x24 --tile 8 --cache 60% --effects shadow,ao,diffuse");
+        settings.set("adapter", &adapter).expect("an adapter");
+        let mut session = Session::open(&scene, &settings).expect("a session");
+        let camera = session.path().frame(0, 2);
+        let picture = session.frame(&camera).expect("a frame").pixels.radiance;
+        let few = session.trace(&rays[..5], false).expect("hits");
+        assert!(few == many[..5], "{adapter}: rays between frames");
+        let next = session.frame(&camera).expect("a frame").pixels.radiance;
+        let mut fresh = Session::open(&scene, &settings).expect("a session");
+        let of_fresh = [0; 2].map(|_| fresh.frame(&camera).expect("a frame").pixels.radiance);
+        assert!([picture, next] == of_fresh, "{adapter}: rays between frames change the next");
     }
 }
 

@@ -610,7 +610,12 @@ fn rays_are_sifted_by_maps_alone() {
     for levels in [0, 2] {
         let findings = Arc::new(Mutex::new(Findings::default()));
         let mut executor = lockstep(&device, &scene, &pages, &VARIANT, &findings);
-        executor.begin_frame(&View { frame: FRAME, params: Params::default(), directions: Directions::default() });
+        executor.begin_frame(&View {
+            frame: FRAME,
+            params: Params::default(),
+            directions: Directions::default(),
+            rays: None,
+        });
         let maps = RomaMaps::new(&boms, levels, &FRAME, roma, (0, 0));
         maps.give(&mut executor, &boms).unwrap();
         executor.set_rays(pass, &rays(32));
@@ -633,7 +638,12 @@ fn distance_fields_of_all_sizes_are_those_of_their_twins() {
             if let Some(defect) = defect {
                 executor = executor.with_defect(defect);
             }
-            executor.begin_frame(&View { frame: FRAME, params: Params::default(), directions: Directions::default() });
+            executor.begin_frame(&View {
+                frame: FRAME,
+                params: Params::default(),
+                directions: Directions::default(),
+                rays: None,
+            });
             let maps = base_maps(cells, every);
             let own: Vec<DistanceField> = maps.levels.iter().map(DistanceField::new).collect();
             let fields = DfMaps::new(&maps, &FRAME, &field(64));
