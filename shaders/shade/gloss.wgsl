@@ -95,8 +95,8 @@ fn gloss_of(seen: GBuffer, index: u32, view: vec3<f32>) -> Gloss {
             inside = share;
             bounces = 0.0;
         } else {
-            // Rays that meet it stand for those as well that pass straight through, by alpha. Light enters it more often,
-            // and by as much its base colour is brighter.
+            // Rays that meet it stand for those as well that pass straight through, by alpha. Light enters it more
+            // often, and by as much its base colour is brighter.
             let passing = share * (1.0 - m.metallic) * max(m.base_color.r, max(m.base_color.g, m.base_color.b));
             let alpha = 1.0 - passing * (1.0 - m.specular.x);
             specular = min(specular / max(alpha, 1.0e-6), vec3<f32>(1.0));

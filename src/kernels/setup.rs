@@ -172,7 +172,7 @@ pub struct View {
     pub params: Params,
     /// Directions of the passes that start at hits.
     pub directions: Directions,
-    /// Rays of its passes, from outside, where they are fewer than the extent holds: kernels then run over the rows that
-    /// hold them, and nothing of others can be read.
+    /// Rays of its passes, from outside, where they are fewer than the extent holds: kernels then run over the rows
+    /// that hold them, and nothing of others can be read.
     pub rays: Option<usize>,
 }

@@ -301,8 +301,8 @@ fn looks(info: &TextureInfo, wrap: u32) -> Looks {
     (set(info), rows(info), wrap)
 }
 
-/// The transmission texture, if it can be used and is looked up where the base colour is: rays pass by the alpha of both
-/// together.
+/// The transmission texture, if it can be used and is looked up where the base colour is: rays pass by the alpha of
+/// both together.
 fn passing_texture<'a>(
     document: &Document,
     json: &'a Json,

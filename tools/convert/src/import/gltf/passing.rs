@@ -1,4 +1,5 @@
-//! What lets light pass: thin walls and bodies (KHR_materials_transmission, _volume, _ior), and textures that say where.
+//! What lets light pass: thin walls and bodies (KHR_materials_transmission, _volume, _ior), and textures that say
+//! where.
 
 use super::document::{Material as Json, Volume};
 use super::materials::{MOST_INDEX, unit};
@@ -9,8 +10,8 @@ use bricks::{MATERIAL_BLEND, MATERIAL_MASK, MATERIAL_REFRACTS, Material, pack_ab
 /// What a surface lets pass of the light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Passing {
-    /// Bits of four shares, 0..=1, so that textures can be told apart by them: what is transmitted; what is no metal; the
-    /// brightest component of the base colour; the greatest of what is reflected along the normal.
+    /// Bits of four shares, 0..=1, so that textures can be told apart by them: what is transmitted; what is no metal;
+    /// the brightest component of the base colour; the greatest of what is reflected along the normal.
     shares: [u32; 4],
     /// It is a body, not a thin wall.
     pub is_body: bool,
