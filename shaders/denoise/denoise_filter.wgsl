@@ -44,6 +44,12 @@ fn of_normals(a: vec3<f32>, b: vec3<f32>) -> f32 {
     return cosine;
 }
 
+// The unit vector along which a surface mirrors the view.
+fn mirrored(s: DenoiseSeen) -> vec3<f32> {
+    let view = divided(s.point, max(square_root(dot_of(s.point, s.point)), LEAST_NORMAL_NUMBER));
+    return view - barrier3(2.0 * barrier(dot_of(view, s.normal)) * s.normal);
+}
+
 // The variance over 3x3 pixels by a Gaussian.
 fn smooth_variance(place: vec2<i32>, pixel: u32, base: u32, surface: DenoiseSeen) -> f32 {
     let first = least_around(place, 1);
@@ -102,6 +108,11 @@ fn main(
     }
     let plane = max(divide(PLANE_FIRST, max(known[at].length, 1.0)), PLANE_LEAST);
     let per_length = divide(1.0, max(barrier(plane * surface.footprint), LEAST_NORMAL_NUMBER));
+    let polish = given[pixel].polish;
+    var way = vec3<f32>(0.0);
+    if polish > 0.0 {
+        way = mirrored(surface);
+    }
     let step = i32(1u << own.level);
     var sum = vec3<f32>(0.0);
     var variances = 0.0;
@@ -124,7 +135,13 @@ fn main(
                 let per_distance = bitcast<f32>((127u - own.level - doubled) << 23u);
                 let off = barrier(barrier(off_plane(surface, seen[other].point) * per_length) * per_distance);
                 let apart = barrier(size(theirs.color - mine.color) * per_size);
-                weight = barrier(weight * of_normals(surface.normal, seen[other].normal)) * exp_of_minus(off + apart);
+                var turned = 0.0;
+                if polish > 0.0 {
+                    let by = mirrored(seen[other]) - way;
+                    turned = barrier(square_root(dot_of(by, by)) * polish);
+                }
+                let unlike = off + apart + turned;
+                weight = barrier(weight * of_normals(surface.normal, seen[other].normal)) * exp_of_minus(unlike);
             }
             weight = barrier(weight);
             if !(weight >= LEAST_WEIGHT) {

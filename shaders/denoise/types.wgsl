@@ -26,9 +26,9 @@ struct DenoiseGiven {     // What a pixel is given beside that.
     // both plus 1; NONE: the surface is new
     before: u32,
     direct: vec3<f32>,    // the light of lamps on it, reflected
-    padding0: u32,
+    polish: f32,          // 1 / the angle within which what it mirrors is alike, radians; 0 where it mirrors little
     around: vec3<f32>,    // what goes around the filter
-    padding1: u32,
+    padding0: u32,
     shares: vec4<f32>,    // what that pixel, the next, and the two below weigh
 }
 

@@ -26,6 +26,8 @@ pub struct Seen {
     /// Share of light from everywhere that it reflects, diffusely and otherwise, linear; of a pixel's samples together
     /// the mean, where those that see something else count as black.
     pub albedo: [f32; 3],
+    /// 1 / the angle within which what it mirrors is alike, radians; 0 where it mirrors little.
+    pub polish: f32,
 }
 
 /// The second surface that samples of a pixel saw.
@@ -168,15 +170,24 @@ impl Sums {
     }
 }
 
+/// Of a pixel's angle: how far apart a mirror's directions bring much the same light.
+const PIXEL: f32 = 0.5;
+
 /// What was added to radiance that is summed.
 fn added(now: [f32; 4], before: [f32; 4]) -> [f64; 3] {
     [0, 1, 2].map(|k| f64::from(now[k]) - f64::from(before[k]))
 }
 
-/// What the surface of a hit reflects of light from everywhere.
-fn albedo(g: &GBuffer, materials: &[Material], ray: &Ray) -> [f32; 3] {
-    let of = |material: &Material| Gloss::of(g, material, ray.direction.map(|x| -x)).albedo();
-    materials.get(g.material as usize).map_or(g.albedo, of)
+/// What the surface of a hit reflects of light from everywhere, and its polish, seen through a pixel of this angle.
+///
+/// Of a lobe with the square of roughness a, directions that are a / (1 - a) apart bring much the same light; what a
+/// pixel covers is blurred as it is. Where the surface reflects diffusely as well, less depends on what it mirrors, so
+/// its share counts, squared.
+fn reflects(g: &GBuffer, materials: &[Material], ray: &Ray, pixel: f32) -> ([f32; 3], f32) {
+    let Some(material) = materials.get(g.material as usize) else { return (g.albedo, 0.0) };
+    let gloss = Gloss::of(g, material, ray.direction.map(|x| -x));
+    let [share, alpha] = gloss.mirrors();
+    (gloss.albedo(), share * share * (1.0 - alpha) / (alpha + PIXEL * pixel))
 }
 
 impl GuideReader {
@@ -271,13 +282,18 @@ impl GuideReader {
                 let way = in_f64(ray.direction);
                 let point = view.frame.origin + view.frame.unit * (in_f64(ray.origin) + f64::from(hit.t) * way);
                 let point = if is_hit { point } else { way };
+                let footprint = if is_hit { self.projection.footprint(point) as f32 } else { 0.0 };
+                let distance = (point - self.projection.position()).length().max(f64::MIN_POSITIVE) as f32;
+                let pixel = footprint / distance;
+                let (albedo, polish) = if is_hit { reflects(g, materials, ray, pixel) } else { ([0.0; 3], 0.0) };
                 let seen = Seen {
                     point,
                     plane: Vec3::from_array(surface.normal),
                     normal: Vec3::from_array(g.normal),
                     id: hit.id,
-                    footprint: if is_hit { self.projection.footprint(point) as f32 } else { 0.0 },
-                    albedo: if is_hit { albedo(g, materials, ray) } else { [0.0; 3] },
+                    footprint,
+                    albedo,
+                    polish,
                 };
                 (seen, if is_hit { g.emission } else { [0.0; 3] })
             })
@@ -302,6 +318,10 @@ impl GuideReader {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn albedo(g: &GBuffer, materials: &[Material], ray: &Ray) -> [f32; 3] {
+        reflects(g, materials, ray, 0.001).0
+    }
 
     /// Light is divided by all that a surface reflects: a dye that is black in a channel still shines by its surface,
     /// and light there divided by the base colour alone would be far too bright for its neighbours.

@@ -3,7 +3,7 @@
 
 use super::buffers::{Buffers, LAYERS};
 use super::grid::{Grid, difference, divided, dot, is_same, off_plane, size};
-use crate::kernels::layout::{DenoiseLit, DenoiseOwn, DenoisePast, DenoiseSeen};
+use crate::kernels::layout::{DenoiseGiven, DenoiseLit, DenoiseOwn, DenoisePast, DenoiseSeen};
 use crate::math::exact::{divide, square_root};
 use rayon::prelude::*;
 
@@ -42,6 +42,13 @@ fn of_normals(a: [f32; 3], b: [f32; 3]) -> f32 {
     cosine
 }
 
+/// The unit vector along which a surface mirrors the view.
+fn mirrored(s: &DenoiseSeen) -> [f32; 3] {
+    let view = divided(s.point, square_root(dot(s.point, s.point)).max(f32::MIN_POSITIVE));
+    let along = 2.0 * dot(view, s.normal);
+    [0, 1, 2].map(|k| view[k] - along * s.normal[k])
+}
+
 fn smooth_variance(grid: Grid, seen: &[DenoiseSeen], lit: &[DenoiseLit], pixel: usize) -> f32 {
     let (x, y) = grid.position(pixel);
     let (mut sum, mut weights) = (0.0, 0.0);
@@ -57,7 +64,7 @@ fn smooth_variance(grid: Grid, seen: &[DenoiseSeen], lit: &[DenoiseLit], pixel: 
 /// One pixel. Pixels without variance around them stay as they are, but for young ones.
 fn filtered(
     own: &DenoiseOwn,
-    seen: &[DenoiseSeen],
+    (seen, given): (&[DenoiseSeen], &[DenoiseGiven]),
     lit: &[DenoiseLit],
     known: &DenoisePast,
     pixel: usize,
@@ -74,6 +81,8 @@ fn filtered(
     let per_size = if is_young { 0.0 } else { divide(1.0, own.tolerance * square_root(variance) + 1e-12) };
     let plane = divide(PLANE_FIRST, known.length.max(1.0)).max(PLANE_LEAST);
     let per_length = divide(1.0, (plane * surface.footprint).max(f32::MIN_POSITIVE));
+    let polish = given[pixel].polish;
+    let way = if polish > 0.0 { mirrored(surface) } else { [0.0; 3] };
     let step = 1i32 << own.level;
     let (x, y) = grid.position(pixel);
     let mut sum = [0.0f32; 3];
@@ -89,7 +98,13 @@ fn filtered(
             let per_distance = 1.0 / (dx.abs().max(dy.abs()) * step) as f32;
             let off = off_plane(surface, seen[other].point) * per_length * per_distance;
             let apart = size(difference(theirs.color, mine.color)) * per_size;
-            weight = weight * of_normals(surface.normal, seen[other].normal) * exp_of_minus(off + apart);
+            let mut turned = 0.0;
+            if polish > 0.0 {
+                let by = difference(mirrored(&seen[other]), way);
+                turned = square_root(dot(by, by)) * polish;
+            }
+            let unlike = off + apart + turned;
+            weight = weight * of_normals(surface.normal, seen[other].normal) * exp_of_minus(unlike);
         }
         if weight.is_nan() || weight < LEAST_WEIGHT {
             continue;
@@ -105,14 +120,14 @@ fn filtered(
 /// One level over a layer. Levels read one half of the light and write the other; after the first, its colour is the
 /// history's.
 pub fn filter(own: &DenoiseOwn, buffers: &mut Buffers) {
-    let (seen, pixels) = (buffers.seen, Grid::new(own).pixels());
+    let (shown, pixels) = ((buffers.seen, buffers.given), Grid::new(own).pixels());
     let first = own.layer as usize * pixels;
     let (one, two) = buffers.lit.split_at_mut(LAYERS * pixels);
     let (lit, to) = if own.level.is_multiple_of(2) { (two, one) } else { (one, two) };
     let (lit, to, known) = (&lit[first..][..pixels], &mut to[first..][..pixels], &buffers.known[first..][..pixels]);
     let past = buffers.past[first..][..pixels].par_iter_mut();
     to.par_iter_mut().zip(past).enumerate().with_min_len(256).for_each(|(pixel, (to, past))| {
-        let found = filtered(own, seen, lit, &known[pixel], pixel);
+        let found = filtered(own, shown, lit, &known[pixel], pixel);
         *to = found.unwrap_or(lit[pixel]);
         if own.level == 0 {
             *past = known[pixel];

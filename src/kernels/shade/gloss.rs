@@ -273,6 +273,17 @@ impl Gloss {
         each(|k| self.diffuse[k] + around[k] + self.through[k])
     }
 
+    /// How much of what it reflects it mirrors, 0..=1, and the square of the roughness of that, a mean of its lobes.
+    pub fn mirrors(&self) -> [f32; 2] {
+        let mean = |c: Vec3| (c[0] + c[1] + c[2]) / 3.0;
+        let (facets, all) = (mean(self.share) * self.under, mean(self.albedo()));
+        let both = facets + self.coat_share;
+        if both <= 0.0 {
+            return [0.0, 1.0];
+        }
+        [least(both / all, 1.0), (facets * self.alpha + self.coat_share * self.coat_alpha) / both]
+    }
+
     /// What the surface reflects otherwise than diffusely of the background, unshadowed, where rays of its own do not
     /// bring it.
     pub fn reflected_ambient(&self, bound: &Bound) -> Vec3 {

@@ -51,7 +51,15 @@ impl Given {
         let given = pixels.map(|(pixel, ((seen, direct), around))| {
             let taps = before.and_then(|before| reproject(guides, pixel, before));
             let Taps { before, shares } = taps.unwrap_or_default();
-            DenoiseGiven { albedo: seen.albedo, before, direct: *direct, around: *around, shares, ..Default::default() }
+            DenoiseGiven {
+                albedo: seen.albedo,
+                before,
+                direct: *direct,
+                polish: seen.polish,
+                around: *around,
+                shares,
+                ..Default::default()
+            }
         });
         Self {
             given: given.collect(),

@@ -4,6 +4,7 @@ use super::grid::Grid;
 use crate::frame::{Guides, Seen};
 use crate::kernels::layout::NONE;
 use crate::scene::Projection;
+use glam::DVec3;
 
 /// What is kept of what a frame saw.
 #[derive(Clone, Debug)]
@@ -35,11 +36,24 @@ impl Default for Taps {
 
 /// Least sum of bilinear weights of usable pixels.
 const LEAST_WEIGHT: f32 = 0.01;
+/// By so many times the angle within which it is alike may what a surface mirrors have turned.
+const MOST_TURNED: f32 = 1.0;
+
+/// How far what a surface mirrors has turned since the frame before, as the camera moved: 1 is the angle within which
+/// it is alike.
+fn turned(seen: &Seen, now: DVec3, before: DVec3) -> f32 {
+    let normal = seen.normal.as_dvec3();
+    let mirrored = |from: DVec3| (seen.point - from).normalize_or_zero().reflect(normal);
+    (mirrored(now) - mirrored(before)).length() as f32 * seen.polish
+}
 
 /// Where the surface of a pixel was before; `None` where it is new.
 pub fn reproject(now: &Guides, pixel: usize, before: &Before) -> Option<Taps> {
     let seen = now.then(&now.seen[pixel]);
     if !seen.is_hit() {
+        return None;
+    }
+    if seen.polish > 0.0 && turned(&seen, now.projection.position(), before.projection.position()) > MOST_TURNED {
         return None;
     }
     let grid = Grid::new(now.size);

@@ -115,6 +115,31 @@ pub(super) fn cube() -> Vec<([[f32; 3]; 4], usize)> {
     quads
 }
 
+/// The filter leaves mirrors as they are, and takes noise from rough metal.
+#[test]
+fn mirrored_things_stay_sharp_under_the_denoiser() {
+    let folder = common::folder();
+    let folder = folder.path();
+    let view = path(folder, "outside", 50.0, [3.0, 2.0, 4.0], [0.0; 3]);
+    // Stripes of three degrees.
+    let image = folder.join("stripes.exr");
+    let stripe = |x: usize| if x / 4 % 2 == 0 { 0.9f32 } else { 0.1 };
+    write_rgb_file(&image, 480, 240, |x, _| (stripe(x), stripe(x), stripe(x))).expect("an environment");
+    let light = format!("--environment {} --sun-intensity 0 --effects glossy --rotation full", image.display());
+    for (roughness, bound) in [(0.0, 1.1), (0.5, 0.7)] {
+        let scene = converted(folder, &format!("metal-{roughness}"), &white(1.0, roughness, 0.0), &cube());
+        let seen = |options: &str| render(&scene, &view, &format!("{light} {options}"));
+        let truth = seen("--spp 512 --seed 5");
+        let error = |found: BTreeMap<String, Vec<f32>>| {
+            let hit = (0..32 * 32).filter(|&i| truth["depth.Z"][i].is_finite());
+            hit.map(|i| f64::from(found["R"][i] - truth["R"][i]).powi(2)).sum::<f64>().sqrt()
+        };
+        let [noisy, denoised] = ["--spp 2", "--spp 2 --denoise"].map(|options| error(seen(options)));
+        println!("{roughness}: {noisy} {denoised}");
+        assert!(denoised < bound * noisy, "roughness {roughness}: {denoised} of {noisy}");
+    }
+}
+
 #[test]
 fn white_objects_vanish_in_a_uniform_environment_whatever_their_gloss() {
     let folder = common::folder();

@@ -348,7 +348,7 @@ fn fireflies_of_any_colour_are_cut() {
         let point = camera.position - direction * (5.0 / direction.dot(toward));
         let normal = toward.as_vec3();
         let footprint = projection.footprint(point) as f32;
-        Seen { point, plane: normal, normal, id: 1, footprint, albedo: [0.5; 3] }
+        Seen { point, plane: normal, normal, id: 1, footprint, albedo: [0.5; 3], polish: 0.0 }
     };
     let guides = Guides {
         size,
