@@ -8,6 +8,7 @@ use super::convert::{summarise, usage};
 use super::interrupt;
 use crate::cli::output::{is_quiet, one_line};
 use crate::output::atomic;
+use crate::settings::folder::{self, CACHE_VARIABLE};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::import::{EXTENSIONS, FileState, ImportSettings, Input, TILESET, import};
@@ -18,9 +19,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Instant, UNIX_EPOCH};
 use xxhash_rust::xxh3::xxh3_64;
-
-/// Names the folder; without it scenes are in the folder `brickwalk` of the user's cache.
-const FOLDER_VARIABLE: &str = "BRICKWALK_CACHE_DIR";
 
 /// The files that a conversion looked for.
 #[derive(Serialize, Deserialize, PartialEq)]
@@ -60,20 +58,12 @@ fn is_model(path: &Path) -> bool {
         || path.file_name().is_some_and(|name| name == TILESET)
 }
 
-/// The folder of converted models: what [`FOLDER_VARIABLE`] says, else that of the platform.
+/// The folder of converted models.
 ///
 /// # Errors
 /// The environment names no folder.
 fn folder() -> Result<PathBuf> {
-    let of = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let of_platform = || match () {
-        () if cfg!(windows) => of("LOCALAPPDATA"),
-        () if cfg!(target_os = "macos") => of("HOME").map(|home| home.join("Library/Caches")),
-        () => of("XDG_CACHE_HOME").or_else(|| of("HOME").map(|home| home.join(".cache"))),
-    };
-    of(FOLDER_VARIABLE)
-        .or_else(|| of_platform().map(|folder| folder.join("brickwalk")))
-        .with_context(|| format!("there is no folder for converted models; name one in {FOLDER_VARIABLE}"))
+    folder::cache().with_context(|| format!("there is no folder for converted models; name one in {CACHE_VARIABLE}"))
 }
 
 /// The scene file that `path` stands for: `path` itself, or of a model the converted one.
@@ -107,7 +97,7 @@ fn scene_told(path: &Path, progress: Option<&Progress>, say: &dyn Fn(&str)) -> R
     let file = folder()?.join(format!("{name}-{key:016x}.bricks"));
     let folder = file.parent().unwrap_or(Path::new("."));
     std::fs::create_dir_all(folder).with_context(|| {
-        format!("{}: cannot make this folder for converted models; name another in {FOLDER_VARIABLE}", folder.display())
+        format!("{}: cannot make this folder for converted models; name another in {CACHE_VARIABLE}", folder.display())
     })?;
     let lock = lock(&file.with_extension("lock"), path, say)?;
     if is_current(&file) {
@@ -165,7 +155,7 @@ fn say(line: &str) {
 fn lock(path: &Path, model: &Path, say: &dyn Fn(&str)) -> Result<File> {
     let file = File::options().create(true).truncate(false).write(true).open(path);
     let file = file.with_context(|| {
-        format!("{}: cannot write to this folder; name another in {FOLDER_VARIABLE}", path.display())
+        format!("{}: cannot write to this folder; name another in {CACHE_VARIABLE}", path.display())
     })?;
     if let Err(std::fs::TryLockError::WouldBlock) = file.try_lock() {
         say(&format!("{}: another process converts it; waiting", model.display()));

@@ -3,7 +3,7 @@
 
 use super::device::Gpu;
 use super::groups::numbered;
-use super::kernels::Kernels;
+use super::kernels::{Kernels, Pipeline};
 use super::rays::storage;
 use super::readback::device_error;
 use super::{kernels, wgsl};
@@ -13,6 +13,7 @@ use crate::kernels::trace::binary_tree::{Tree, top_height, tree_of};
 use crate::schedule::ExecutorError;
 use bricks::SceneFile;
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Bricks whose trees are made at a time, a thread.
 const AT_A_TIME: usize = 8;
@@ -26,7 +27,7 @@ pub struct BinaryTrees {
     /// Group 3 of the kernel.
     pub group: wgpu::BindGroup,
     /// The kernel.
-    pub pipeline: wgpu::ComputePipeline,
+    pub pipeline: Pipeline,
 }
 
 impl BinaryTrees {
@@ -147,7 +148,7 @@ fn pipeline(
     kernels: &Kernels,
     pages: usize,
     stack: u32,
-) -> Result<(wgpu::BindGroupLayout, wgpu::ComputePipeline), ExecutorError> {
+) -> Result<(wgpu::BindGroupLayout, Pipeline), ExecutorError> {
     let binary = |name: &str| (name == "trace/binary.wgsl").then(|| wgsl::binary_accessors(pages, stack.max(1)));
     let device = &gpu.device;
     let group = kernels::read_layout(device, "binary", 1 + pages);
@@ -158,6 +159,7 @@ fn pipeline(
     });
     let kernel = table::kernel(names::intersect_binary)
         .ok_or_else(|| ExecutorError::Device("has no kernel over binary trees; this is a bug in brickwalk".into()))?;
-    let pipeline = kernels.make(gpu, kernel, &layout, kernels::source_with(kernel.file, kernels.pages, &binary));
+    let text = kernels::source_with(kernel.file, kernels.pages, &binary);
+    let pipeline = kernels.pipeline_of(gpu, kernel, layout, Some(Arc::new(move |_| text.clone())));
     Ok((group, pipeline))
 }

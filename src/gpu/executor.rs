@@ -271,7 +271,7 @@ impl GpuExecutor {
             let binary = self.binary.as_ref().filter(|_| dispatch.kernel == names::intersect_binary);
             let pipeline = match (family, binary) {
                 (Some((family, _)), _) => family.pipeline(dispatch.kernel),
-                (None, Some(binary)) => Some(&binary.pipeline),
+                (None, Some(binary)) => Some(binary.pipeline.get()),
                 (None, None) => self.kernels.pipeline(dispatch.kernel),
             };
             let (Some(kernel), Some(pipeline)) = (kernel, pipeline) else {

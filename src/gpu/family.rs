@@ -3,7 +3,7 @@
 
 use super::device::Gpu;
 use super::groups::numbered;
-use super::kernels::{self, Kernels};
+use super::kernels::{self, Kernels, Pipeline};
 use super::lamps::LampBuffers;
 use super::rays::storage;
 use crate::kernels::table::{Bindings, Family};
@@ -24,7 +24,7 @@ pub struct FamilyBuffers {
     /// What its method has noted.
     pub held: Option<Box<dyn Any>>,
     layout: wgpu::BindGroupLayout,
-    pipelines: Vec<(&'static str, wgpu::ComputePipeline)>,
+    pipelines: Vec<(&'static str, Pipeline)>,
     buffers: Vec<wgpu::Buffer>,
 }
 
@@ -53,8 +53,7 @@ impl FamilyBuffers {
         let pipelines = family.kernels.iter().map(|kernel| {
             let own = (kernel.bindings == Bindings::Own).then_some(&layout);
             let pipeline_layout = kernels.pipeline_layout(gpu, kernel.bindings, own);
-            let text = kernels::source(kernel.file, kernels.pages);
-            (kernel.name, kernels.make(gpu, kernel, &pipeline_layout, text))
+            (kernel.name, kernels.pipeline_of(gpu, kernel, pipeline_layout, None))
         });
         let pipelines = pipelines.collect();
         let buffers: Vec<_> = family.buffers.iter().map(|buffer| storage(gpu, buffer.name, 1, buffer.stride)).collect();
@@ -64,7 +63,7 @@ impl FamilyBuffers {
 
     /// The pipeline of a kernel, if it is one of these.
     pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
-        self.pipelines.iter().find(|(own, _)| *own == name).map(|(_, pipeline)| pipeline)
+        self.pipelines.iter().find(|(own, _)| *own == name).map(|(_, pipeline)| pipeline.get())
     }
 
     /// A buffer.

@@ -5,6 +5,7 @@ use super::wgsl;
 use super::wgsl::Pages;
 use crate::kernels::table::{Bindings, Family, KERNELS, Kernel};
 use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
@@ -29,6 +30,47 @@ enum Bound {
     Params,
 }
 
+/// The text of a kernel's file, with everything it includes.
+type Source = Arc<dyn Fn(&str) -> String + Send + Sync>;
+
+/// A pipeline, which is compiled when it is first wanted: few frames run all kernels.
+pub struct Pipeline {
+    device: wgpu::Device,
+    kernel: &'static Kernel,
+    layout: wgpu::PipelineLayout,
+    count: bool,
+    source: Source,
+    made: OnceLock<wgpu::ComputePipeline>,
+}
+
+impl Pipeline {
+    /// The pipeline.
+    pub fn get(&self) -> &wgpu::ComputePipeline {
+        self.made.get_or_init(|| self.compile())
+    }
+
+    fn compile(&self) -> wgpu::ComputePipeline {
+        let kernel = self.kernel;
+        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(kernel.file),
+            source: wgpu::ShaderSource::Wgsl((self.source)(kernel.file).into()),
+        });
+        let counted = |&(name, value): &(&'static str, f64)| {
+            let is_counting = self.count && name == "COUNT";
+            (name, if is_counting { 1.0 } else { value })
+        };
+        let constants: Vec<(&str, f64)> = kernel.overrides.iter().map(counted).collect();
+        self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(kernel.name),
+            layout: Some(&self.layout),
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
+            cache: None,
+        })
+    }
+}
+
 /// All pipelines and the layouts of their groups.
 pub struct Kernels {
     /// Numbers of pages that they bind.
@@ -51,17 +93,23 @@ pub struct Kernels {
     pub none: wgpu::BindGroupLayout,
     /// Whether intersection kernels count nodes and triangles.
     pub count: bool,
-    pipelines: HashMap<&'static str, wgpu::ComputePipeline>,
+    source: Source,
+    pipelines: HashMap<&'static str, Pipeline>,
 }
 
 impl Kernels {
-    /// Compiles every kernel for `pages`. `count` makes intersection kernels count nodes and triangles.
+    /// Every kernel for `pages`. `count` makes intersection kernels count nodes and triangles.
     pub fn new(gpu: &Gpu, pages: Pages, count: bool) -> Self {
-        Self::from_sources(gpu, pages, count, &|file| source(file, pages))
+        Self::from_sources(gpu, pages, count, move |file| source(file, pages))
     }
 
     /// [`Self::new`] from the texts that `source` gives for the files of kernels.
-    pub fn from_sources(gpu: &Gpu, pages: Pages, count: bool, source: &dyn Fn(&str) -> String) -> Self {
+    pub fn from_sources(
+        gpu: &Gpu,
+        pages: Pages,
+        count: bool,
+        source: impl Fn(&str) -> String + Send + Sync + 'static,
+    ) -> Self {
         use Bound::{Params, Read, Write};
         let device = &gpu.device;
         let opacity = pages.opacity.then_some(wgsl::OPACITY_BINDING);
@@ -77,8 +125,9 @@ impl Kernels {
         let sampling = layout(device, "sampling", &[&fixed[..], &vec![Read; pages.texels]].concat());
         let lamps = layout(device, "lamps", &[Read; 4]);
         let none = layout(device, "none", &[]);
+        let (source, pipelines): (Source, _) = (Arc::new(source), HashMap::new());
         let mut all =
-            Self { pages, scene, rays, cache, lamps, tiles, shading, sampling, none, count, pipelines: HashMap::new() };
+            Self { pages, scene, rays, cache, lamps, tiles, shading, sampling, none, count, source, pipelines };
         // Scenes without textures have no kernel that looks them up, and those without binary trees none over them.
         let is_made = |kernel: &&Kernel| match kernel.bindings {
             Bindings::Sampling => pages.texels > 0,
@@ -90,7 +139,7 @@ impl Kernels {
         let mut pipelines = HashMap::new();
         for kernel in KERNELS.iter().filter(is_made) {
             let layout = layouts.entry(kernel.bindings).or_insert_with(|| layout(kernel.bindings));
-            pipelines.insert(kernel.name, all.make(gpu, kernel, layout, source(kernel.file)));
+            pipelines.insert(kernel.name, all.pipeline_of(gpu, kernel, layout.clone(), None));
         }
         all.pipelines = pipelines;
         all
@@ -118,36 +167,21 @@ impl Kernels {
         })
     }
 
-    /// The pipeline of a kernel, from the text of its file.
-    pub fn make(
+    /// The pipeline of a kernel; `source` gives the text of its file where that is not as for all.
+    pub fn pipeline_of(
         &self,
         gpu: &Gpu,
-        kernel: &Kernel,
-        layout: &wgpu::PipelineLayout,
-        text: String,
-    ) -> wgpu::ComputePipeline {
-        let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(kernel.file),
-            source: wgpu::ShaderSource::Wgsl(text.into()),
-        });
-        let counted = |&(name, value): &(&'static str, f64)| {
-            let is_counting = self.count && name == "COUNT";
-            (name, if is_counting { 1.0 } else { value })
-        };
-        let constants: Vec<(&str, f64)> = kernel.overrides.iter().map(counted).collect();
-        gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(kernel.name),
-            layout: Some(layout),
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions { constants: &constants, ..Default::default() },
-            cache: None,
-        })
+        kernel: &'static Kernel,
+        layout: wgpu::PipelineLayout,
+        source: Option<Source>,
+    ) -> Pipeline {
+        let source = source.unwrap_or_else(|| self.source.clone());
+        Pipeline { device: gpu.device.clone(), kernel, layout, count: self.count, source, made: OnceLock::new() }
     }
 
-    /// The pipeline of a kernel of [`KERNELS`], if it is made.
+    /// The pipeline of a kernel of [`KERNELS`], if there is one.
     pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
-        self.pipelines.get(name)
+        self.pipelines.get(name).map(Pipeline::get)
     }
 }
 

@@ -26,12 +26,12 @@ fn a_sound_device_passes() {
 }
 
 /// An executor over the probe's own scene, with as many pages as asked and one kernel's text changed.
-fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<GpuExecutor> {
+fn executor(pages: usize, change: impl Fn(&str, String) -> String + Send + Sync + 'static) -> Option<GpuExecutor> {
     let gpu = device()?;
     let pages =
         Pages { cache: pages, texels: 1, opacity: false, gloss: false, layers: false, levels: false, hides: false };
-    let source = |kernel: &str| change(kernel, kernels::source(kernel, pages));
-    let kernels = Arc::new(Kernels::from_sources(&gpu, pages, false, &source));
+    let source = move |kernel: &str| change(kernel, kernels::source(kernel, pages));
+    let kernels = Arc::new(Kernels::from_sources(&gpu, pages, false, source));
     let scene = Arc::new(scene().unwrap());
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1).unwrap();
     let extent = Extent { width: 8, height: 8, tile: 8 };
@@ -42,7 +42,7 @@ fn executor(pages: usize, change: &dyn Fn(&str, String) -> String) -> Option<Gpu
 #[test]
 fn sound_pipelines_agree() {
     for pages in [1, 3] {
-        let Some(executor) = executor(pages, &|_, text| text) else { return };
+        let Some(executor) = executor(pages, |_, text| text) else { return };
         let start = Instant::now();
         let checks = compare_pipelines(&executor);
         println!("{pages} pages: {:?}", start.elapsed());
@@ -109,12 +109,12 @@ fn a_pipeline_that_differs_is_named() {
         ),
     ];
     for (kernel, sound, broken, lines) in defects {
-        let change = |file: &str, text: String| {
+        let change = move |file: &str, text: String| {
             let is_own = file.rsplit('/').next() == Some(kernel);
             assert!(!is_own || text.contains(sound), "{sound}");
             if is_own { text.replace(sound, broken) } else { text }
         };
-        let Some(executor) = executor(1, &change) else { return };
+        let Some(executor) = executor(1, change) else { return };
         let failures = failures(&compare_pipelines(&executor));
         for line in lines {
             assert!(failures.iter().any(|f| f.starts_with(&line)), "{broken}: {line}: {failures:#?}");

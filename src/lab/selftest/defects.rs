@@ -150,7 +150,7 @@ impl Defect {
                 bail!("the defect {} has no place: no kernel has {sound:?}", self.name());
             }
         }
-        Ok(Kernels::from_sources(gpu, pages, false, &|kernel| self.plant(kernels::source(kernel, pages))))
+        Ok(Kernels::from_sources(gpu, pages, false, move |kernel| self.plant(kernels::source(kernel, pages))))
     }
 }
 

@@ -55,7 +55,7 @@ fn every_planted_defect_is_noticed() {
     assert!(failed(&sound).is_empty(), "without a defect: {:#?}", sound.rows);
     for &defect in Defect::ALL {
         let case = case_of(defect);
-        let words = format!("--adapter {name} --case {case} --plant {}", defect.name());
+        let words = format!("--adapter {name} --case {case} --rays 10K --plant {}", defect.name());
         let report = test(&args(&words)).expect("a device");
         println!("{}: case {case}, {:.1} s", defect.name(), report.seconds);
         assert_eq!(failed(&report), [case], "{} goes unnoticed: {:#?}", defect.name(), report.rows);
