@@ -181,17 +181,17 @@ pub(super) fn load(file: &File, is_used: &[bool], warnings: &mut Warnings) -> Ma
         let is_used = is_used[index];
         let place = || label("material", index, json.more.name.as_deref());
         let mut material = convert(json, warnings, &place);
-        let has_alpha = material.flags & MATERIAL_BLEND != 0;
         let passing = Passing::of(json, &material, warnings, &place);
+        // Alpha of opaque things and of bodies says nothing.
+        let has_alpha = material.flags & MATERIAL_BLEND != 0 && passing.is_none_or(|passing| !passing.is_body);
         let share = passing.and_then(|_| passing_texture(document, json, warnings, &place));
         if let Some(passing) = &passing {
             passing.apply(json, &mut material, share.is_some(), warnings, &place);
         }
         for (number, info) in infos(json).into_iter().enumerate() {
             let found = match passing {
-                Some(passing) if number == BASE_COLOR => {
-                    // Alpha of opaque things and of bodies says nothing.
-                    let alpha = (has_alpha && !passing.is_body).then_some(3);
+                Some(passing) if number == BASE_COLOR && (share.is_some() || !has_alpha) => {
+                    let alpha = has_alpha.then_some(3);
                     let pack = [Some(0), Some(1), Some(2), alpha].map(|channel| Some((info?, channel?)));
                     let share = share.map(|share| (share, passing, Changed::Base));
                     packed(document, pack, share, warnings, &place)
