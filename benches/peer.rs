@@ -83,7 +83,12 @@ impl Ours {
         let mut session = Opened::open(scene.clone(), path, &settings).expect("a session");
         let camera = CameraPath::read(&path.with_extension("near.json")).expect("its path").frame(0, 30);
         let frame = Frame::near(scene.resident(), camera.position);
-        session.executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default() });
+        session.executor.begin_frame(&View {
+            frame,
+            params: Params::default(),
+            directions: Directions::default(),
+            rays: None,
+        });
         let Opened { executor, cache, .. } = &mut session;
         let bricks: Vec<Item> = (0..cache.states.len() as u32).map(Item::geometry).collect();
         cache.load_all(&mut **executor, &bricks, 64, &mut Counters::default()).expect("room for all");

@@ -123,7 +123,7 @@ fn mirrored_things_stay_sharp_under_the_denoiser() {
     let view = path(folder, "outside", 50.0, [3.0, 2.0, 4.0], [0.0; 3]);
     // Stripes of three degrees.
     let image = folder.join("stripes.exr");
-    let stripe = |x: usize| if x / 4 % 2 == 0 { 0.9f32 } else { 0.1 };
+    let stripe = |x: usize| if (x / 4).is_multiple_of(2) { 0.9f32 } else { 0.1 };
     write_rgb_file(&image, 480, 240, |x, _| (stripe(x), stripe(x), stripe(x))).expect("an environment");
     let light = format!("--environment {} --sun-intensity 0 --effects glossy --rotation full", image.display());
     for (roughness, bound) in [(0.0, 1.1), (0.5, 0.7)] {
