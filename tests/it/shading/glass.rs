@@ -102,7 +102,8 @@ fn as_much_passes_as_a_texture_says() {
     texels.save(folder.join("map.png")).expect("a texture");
     let material = |share: f64, texture: &str, more: &str| {
         format!(
-            r#"{{"doubleSided": true, "pbrMetallicRoughness": {{"metallicFactor": 0, "baseColorFactor": [0.6, 0.6, 0.6, 1]}},
+            r#"{{"doubleSided": true,
+            "pbrMetallicRoughness": {{"metallicFactor": 0, "baseColorFactor": [0.6, 0.6, 0.6, 1]}},
             "extensions": {{"KHR_materials_transmission": {{"transmissionFactor": {share} {texture}}} {more}}}}},
             {}"#,
             glow(12.0)
