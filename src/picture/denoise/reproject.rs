@@ -79,3 +79,33 @@ pub fn reproject(now: &Guides, pixel: usize, before: &Before) -> Option<Taps> {
     // One of the four is in the picture: columns and rows are -1 and more.
     Some(Taps { before: (left + 1) as u32 | ((top + 1) as u32) << 16, shares })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::Vec3;
+
+    /// What a flat mirror shows at a point turns by the angle that the camera goes around it; what is matt does not.
+    #[test]
+    fn mirrored_things_turn_as_the_camera_does() {
+        let around = |angle: f64| 5.0 * DVec3::new(angle.sin(), 0.0, angle.cos());
+        let seen = |polish: f32| Seen {
+            point: DVec3::ZERO,
+            plane: Vec3::Z,
+            normal: Vec3::Z,
+            id: 1,
+            footprint: 0.01,
+            albedo: [0.5; 3],
+            polish,
+        };
+        for angle in [0.005, 0.02] {
+            let found = f64::from(turned(&seen(100.0), around(0.3 + angle), around(0.3)));
+            let expected = 100.0 * 2.0 * (angle / 2.0).sin();
+            assert!((found - expected).abs() < 1e-5, "{angle}: {found} instead of {expected}");
+            assert_eq!(found > f64::from(MOST_TURNED), angle > 0.01);
+            assert_eq!(turned(&seen(0.0), around(0.3 + angle), around(0.3)), 0.0);
+        }
+        // Nearer along the same line nothing turns.
+        assert!(turned(&seen(100.0), 0.5 * around(0.3), around(0.3)) < 1e-5);
+    }
+}
