@@ -2,7 +2,11 @@
 //! two ways to draw the same light.
 
 use crate::common;
+use brickwalk::frame::Seen;
+use brickwalk::picture::denoise::Denoiser;
+use brickwalk::scene::Camera;
 use exr::prelude::*;
+use glam::DVec3;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -115,17 +119,60 @@ pub(super) fn cube() -> Vec<([[f32; 3]; 4], usize)> {
     quads
 }
 
+/// Options of light that is reflected alone, from an environment of stripes of three degrees.
+fn stripes(folder: &Path) -> String {
+    let image = folder.join("stripes.exr");
+    let stripe = |x: usize| if (x / 4).is_multiple_of(2) { 0.9f32 } else { 0.1 };
+    write_rgb_file(&image, 480, 240, |x, _| (stripe(x), stripe(x), stripe(x))).expect("an environment");
+    format!("--environment {} --sun-intensity 0 --effects glossy --rotation full", image.display())
+}
+
+/// On the way past a mirror its history ends, as what it shows moves otherwise than its surface. The control takes the
+/// mirror for matt.
+#[test]
+fn a_walk_past_a_mirror_leaves_no_trail() {
+    let folder = common::folder();
+    let scene = converted(folder.path(), "mirror", &white(1.0, 0.0, 0.0), &cube());
+    let light = stripes(folder.path());
+    let open = |samples: &str| common::renderer(&scene, &format!("--size 32x32 --cache 100% {samples} {light}"));
+    let mut renderer = open("--spp 2 --denoise");
+    let camera = |k: u32| {
+        // Half a stripe a frame.
+        let angle = 0.9 + f64::from(k) * 1.5f64.to_radians();
+        let position = 5.0 * DVec3::new(angle.sin(), 0.4, angle.cos());
+        Camera { position, target: DVec3::ZERO, up: DVec3::Y, fov_y: 50f64.to_radians() }
+    };
+    let (mut denoiser, mut matt) = (Denoiser::default(), Denoiser::default());
+    let last = 7;
+    let mut pictures = [const { Vec::new() }; 3];
+    let mut hits = Vec::new();
+    for k in 0..=last {
+        let output = renderer.frame(k, &camera(k)).expect("a frame");
+        let (noisy, guides) = (output.pixels.radiance, output.guides.expect("guides"));
+        hits = guides.seen.iter().map(Seen::is_hit).collect();
+        let mut as_matt = guides.clone();
+        as_matt.seen.iter_mut().for_each(|seen| seen.polish = 0.0);
+        pictures = [noisy.clone(), noisy.clone(), noisy];
+        denoiser.frame(guides, &mut pictures[1]);
+        matt.frame(as_matt, &mut pictures[2]);
+    }
+    let truth = open("--spp 512").frame(last, &camera(last)).expect("a frame").pixels.radiance;
+    let error = |picture: &[[f32; 3]]| {
+        let of = (0..truth.len()).filter(|&i| hits[i]).map(|i| f64::from(picture[i][0] - truth[i][0]).powi(2));
+        of.sum::<f64>().sqrt()
+    };
+    let [noisy, denoised, control] = pictures.each_ref().map(|picture| error(picture));
+    println!("noisy {noisy}, denoised {denoised}, taken for matt {control}");
+    assert!(denoised < 1.1 * noisy && control > 2.0 * denoised, "{noisy} {denoised} {control}");
+}
+
 /// The filter leaves mirrors as they are, and takes noise from rough metal.
 #[test]
 fn mirrored_things_stay_sharp_under_the_denoiser() {
     let folder = common::folder();
     let folder = folder.path();
     let view = path(folder, "outside", 50.0, [3.0, 2.0, 4.0], [0.0; 3]);
-    // Stripes of three degrees.
-    let image = folder.join("stripes.exr");
-    let stripe = |x: usize| if (x / 4).is_multiple_of(2) { 0.9f32 } else { 0.1 };
-    write_rgb_file(&image, 480, 240, |x, _| (stripe(x), stripe(x), stripe(x))).expect("an environment");
-    let light = format!("--environment {} --sun-intensity 0 --effects glossy --rotation full", image.display());
+    let light = stripes(folder);
     for (roughness, bound) in [(0.0, 1.1), (0.5, 0.7)] {
         let scene = converted(folder, &format!("metal-{roughness}"), &white(1.0, roughness, 0.0), &cube());
         let seen = |options: &str| render(&scene, &view, &format!("{light} {options}"));
