@@ -8,7 +8,7 @@ use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::spread_of;
-use crate::kernels::trace::node::{entered_children, framed_ray, node_hits};
+use crate::kernels::trace::node::{entered_children, framed_ray};
 use crate::kernels::trace::packet::{Packet, RAYS};
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::PacketScratch;
@@ -76,7 +76,7 @@ impl PacketKernel for Query<'_> {
                 rays &= rays - 1;
                 r.enter_leaf(scene, &packet.ray(i), leaf);
                 let limit = &mut packet.t.0[i];
-                let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, *limit);
+                let boxes = isa.hits(&r.ray, &r.lanes, root, 0.0, *limit);
                 let (entered, near) = entered_children(&boxes, root);
                 if entered == 0 {
                     continue;
@@ -139,7 +139,7 @@ fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
         r.enter_leaf(bound.scene, &world, leaf);
         let brick = bound.brick_of(leaf);
         let root = &bound.scene.roots[brick];
-        let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, hit.t);
+        let boxes = bound.isa.hits(&r.ray, &r.lanes, root, 0.0, hit.t);
         let (entered, near) = entered_children(&boxes, root);
         if entered != 0 {
             lists.pair_demand[position].add_ray(near);

@@ -9,10 +9,11 @@ use crate::kernels::layout::{
     PENDING_MISSING,
 };
 use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::simd::isa::Lanes;
 use crate::kernels::tiles::PairCounts;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::{Cone, is_pending, set_pending, spread_of};
-use crate::kernels::trace::node::{by_priority, entered_children, framed_ray, inner_before, node_hits};
+use crate::kernels::trace::node::{by_priority, entered_children, framed_ray, inner_before};
 use crate::kernels::trace::run::{Work, for_each_ray};
 use crate::kernels::trace::scratch::Scratch;
 use crate::kernels::vector::least;
@@ -22,13 +23,41 @@ const TOP_STACK_SIZE: usize = 192;
 
 /// Of the rays of `work`, all or those that walk from the root.
 pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts) {
-    for_each_ray(set, bound, work, |scratch, slot| ask::<WANTED>(bound, scratch, slot, pairs));
+    let leading = leading(bound, set.rays.len());
+    for_each_ray(set, bound, work, |scratch, slot| ask::<WANTED>(bound, scratch, slot, (pairs, &leading)));
 }
 
 /// Of all rays: how many of a tile see each leaf. `pairs` have been started.
 pub fn count_pairs(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
-    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<PAIRS>(bound, scratch, slot, pairs));
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<PAIRS>(bound, scratch, slot, (pairs, &[])));
 }
+
+/// Of each node of the top level the children that lead to a brick in the wanted state, a bit each. A ray asks for
+/// nothing below others, so it need not walk there. Empty where there are too few rays for that to pay.
+fn leading(bound: &Bound, rays: usize) -> Vec<u8> {
+    let nodes = &bound.scene.top8;
+    if nodes.len() > rays / RAYS_A_NODE {
+        return Vec::new();
+    }
+    let mut leading = vec![0u8; nodes.len()];
+    // Children lie behind their parents.
+    for (index, node) in nodes.iter().enumerate().rev() {
+        let inner = u32::from(node.inner_mask);
+        let leads = |slot: &u32| {
+            if inner & 1 << slot != 0 {
+                return leading[(node.child_base + inner_before(inner, *slot)) as usize] != 0;
+            }
+            let leaf = node.triangle_base + u32::from(node.meta[*slot as usize] & 31);
+            bound.is_selected(bound.brick_of(leaf))
+        };
+        let children = (0..8u32).filter(|&slot| node.meta[slot as usize] != 0);
+        leading[index] = children.filter(leads).fold(0, |bits, slot| bits | 1 << slot);
+    }
+    leading
+}
+
+/// With fewer rays for each node of the top level, looking through all nodes costs more than it saves.
+const RAYS_A_NODE: usize = 4;
 
 /// What a ray asks for: bricks in the wanted state.
 const WANTED: u32 = 0;
@@ -37,8 +66,8 @@ const PAIRS: u32 = 1;
 /// What stands in.
 pub const STAND_INS: u32 = 2;
 
-/// Queries of one ray.
-pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
+/// Queries of one ray. It walks to the children in `leading` alone, which may be empty: then to all.
+pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, (pairs, leading): (&PairCounts, &[u8])) {
     if WHAT == WANTED && !is_pending(slot.surface) {
         return;
     }
@@ -61,6 +90,7 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pa
     let world = framed_ray(ray.origin, ray.direction, ray.t_min);
     let up_to_next = WHAT != PAIRS && bound.has(PARAM_NEXT);
     let mut r = BrickRay::outside(&world);
+    let lanes = Lanes::new(&world, [0.0; 3], [0.0; 3]);
     let Scratch { entered: stack, tally, .. } = scratch;
     stack.clear();
     stack.push((0, 0.0));
@@ -74,8 +104,9 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pa
             continue;
         }
         let node = &scene.top8[at as usize];
-        let boxes = node_hits(&world, node, [0.0; 3], [0.0; 3], bound.params.instance_pad, limit);
-        let mut bits = by_priority(boxes.mask, node, world.flip);
+        let boxes = bound.isa.hits(&world, &lanes, node, bound.params.instance_pad, limit);
+        let leading = leading.get(at as usize).map_or(u32::MAX, |&children| children.into());
+        let mut bits = by_priority(boxes.mask & leading, node, world.flip);
         let inner = u32::from(node.inner_mask);
         while bits != 0 {
             // The farthest: the nearest is to be on top of the stack.
@@ -113,7 +144,7 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pa
             }
             r.enter_leaf(scene, &world, leaf);
             let root = &scene.roots[brick];
-            let boxes = node_hits(&r.ray, root, r.offset_high, r.offset_low, 0.0, limit);
+            let boxes = bound.isa.hits(&r.ray, &r.lanes, root, 0.0, limit);
             let (entered, near) = entered_children(&boxes, root);
             if entered == 0 {
                 continue;

@@ -19,7 +19,7 @@ use crate::kernels::trace::scratch::Scratch;
 /// Of all rays: what stands in for what they would enter.
 pub fn query_stand_ins(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
     run_for_each_packet(set, bound, Work::All, &Askers { bound });
-    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<STAND_INS>(bound, scratch, slot, pairs));
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<STAND_INS>(bound, scratch, slot, (pairs, &[])));
 }
 
 /// What [`query_stand_ins`] left each ray with: [`crate::schedule::Report::states`].

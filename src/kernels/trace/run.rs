@@ -6,7 +6,7 @@ use super::packet::{Packet, RAYS};
 use super::packet_walk::PacketScratch;
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, Ray, Surface, TileList};
+use crate::kernels::layout::{Hit, Ray, Surface, T_INFINITE, TileList};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::{Best, Isa};
 use rayon::prelude::*;
@@ -158,12 +158,16 @@ pub trait PacketKernel: Sync {
     fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]);
 }
 
-/// Edge of the blocks whose rays are made packets of, those of an octant together.
-const PACKET_BLOCK: usize = 32;
+/// Edge of the blocks whose rays are made packets of, those that go in much the same direction together.
+const PACKET_BLOCK: usize = 64;
 /// Rays of such a block.
 const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
 /// Bands that a thread has at least, if they can be so low.
-const BANDS: usize = 8;
+const BANDS: usize = 4;
+/// Steps of a direction's components along x and y within its octant, a power of two, by which rays are sorted.
+const STEPS: usize = 4;
+/// Cells of directions: octants by steps.
+const CELLS: usize = 8 * STEPS * STEPS;
 /// So many rays of a square of 8 x 8 go together if they are of one octant; others wait for those of their octant in
 /// the block.
 const LEAST_SQUARE: usize = 16;
@@ -172,7 +176,11 @@ const LEAST_SQUARE: usize = 16;
 pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
     // Where there are many threads, each has its share of bands.
     let height = bound.params.height as usize;
-    let rows = if height < PACKET_BLOCK * BANDS * rayon::current_num_threads() { BLOCK } else { PACKET_BLOCK };
+    let of_thread = height / (BANDS * rayon::current_num_threads());
+    let mut rows = PACKET_BLOCK;
+    while rows > BLOCK && rows > of_thread {
+        rows /= 2;
+    }
     for_each_block(set, bound, work, [rows, BLOCK_RAYS / rows], |task, band, block| match bound.isa {
         Best::Scalar(isa) => run_block(isa, bound, kernel, task, band, block),
         #[cfg(target_arch = "x86_64")]
@@ -244,16 +252,17 @@ fn run_block<I: Isa>(
     (task.packets, task.groups) = (Some(packets), Some(groups));
 }
 
-/// Takes the rays of a block by groups of an octant: those of a square of 8 x 8 where they are of one, then the others.
+/// Takes the rays of a block by groups of an octant: those of a square of 8 x 8 where they are of one, then the others,
+/// sorted by their directions.
 struct Groups {
     /// The square that is looked at next.
     square: usize,
-    /// Rays that wait for others of their octant, and their octants.
+    /// Rays that wait for others of their octant, and the cells of their directions.
     waiting: [(u32, u8); BLOCK_RAYS],
-    /// The same by octants, once there are no more squares.
+    /// The same by cells, once there are no more squares.
     sorted: [u32; BLOCK_RAYS],
-    /// How many of them are of each octant.
-    counts: [usize; 8],
+    /// How many of them are of each cell.
+    counts: [usize; CELLS],
     /// How many have been taken.
     taken: usize,
     /// The group: its octant and the places of its rays.
@@ -265,14 +274,31 @@ struct Groups {
 impl Default for Groups {
     fn default() -> Self {
         let (waiting, sorted, places) = ([(0, 0); BLOCK_RAYS], [0; BLOCK_RAYS], [0; RAYS]);
-        Self { square: 0, waiting, sorted, counts: [0; 8], taken: 0, octant: 0, count: 0, places }
+        Self { square: 0, waiting, sorted, counts: [0; CELLS], taken: 0, octant: 0, count: 0, places }
     }
+}
+
+/// The cell of a ray: the octant of its direction, and in that along a Z-order curve. What rays meet that end soon
+/// depends on where they begin, so of these the octant is all.
+#[inline(always)]
+fn cell_of(ray: &Ray) -> u8 {
+    let first = octant(ray.direction) as usize % 8 * STEPS * STEPS;
+    if ray.t_max < T_INFINITE {
+        return first as u8;
+    }
+    let m = ray.direction.map(f32::abs);
+    let per_sum = STEPS as f32 / (m[0] + m[1] + m[2]);
+    // Casts saturate; what is no number is 0.
+    let step = |x: f32| ((x * per_sum) as usize).min(STEPS - 1);
+    let (x, y) = (step(m[0]), step(m[1]));
+    let spread = |i: usize| i & 1 | (i & 2) << 1;
+    (first + spread(x) + 2 * spread(y)) as u8
 }
 
 impl Groups {
     /// Begins with a block.
     fn clear(&mut self) {
-        (self.square, self.counts, self.taken) = (0, [0; 8], 0);
+        (self.square, self.counts, self.taken) = (0, [0; CELLS], 0);
     }
 
     /// Takes the next group of rays for which `kernel` does anything. False: there is none.
@@ -287,16 +313,14 @@ impl Groups {
     ) -> bool {
         let width = bound.params.width as usize;
         while self.square < block.squares() {
-            let (mut octants, mut octant_of) = (0u32, [0u8; RAYS]);
+            let mut octants = 0u32;
             self.count = 0;
             block.for_each_place(width, self.square, |at| {
                 band.prefetch(isa, at + BLOCK);
                 let slot = band.slot(block.tile, at);
                 if kernel.takes(&slot) {
-                    let octant = octant(slot.ray.direction) % 8;
                     self.places[self.count % RAYS] = at as u32;
-                    octant_of[self.count % RAYS] = octant as u8;
-                    octants |= 1 << octant;
+                    octants |= 1 << (octant(slot.ray.direction) % 8);
                     self.count += 1;
                 }
             });
@@ -307,9 +331,10 @@ impl Groups {
             }
             let waiting: usize = self.counts.iter().sum();
             for i in 0..self.count {
-                let octant = octant_of[i % RAYS];
-                self.waiting[(waiting + i) % BLOCK_RAYS] = (self.places[i % RAYS], octant);
-                self.counts[octant as usize % 8] += 1;
+                let place = self.places[i % RAYS];
+                let cell = cell_of(&band.rays[place as usize]);
+                self.waiting[(waiting + i) % BLOCK_RAYS] = (place, cell);
+                self.counts[cell as usize % CELLS] += 1;
             }
         }
         if self.square == block.squares() {
@@ -317,8 +342,8 @@ impl Groups {
             self.square += 1;
         }
         let mut end = 0;
-        for octant in 0..8 {
-            end += self.counts[octant];
+        for (octant, counts) in self.counts.chunks(CELLS / 8).enumerate() {
+            end += counts.iter().sum::<usize>();
             if self.taken < end {
                 (self.octant, self.count) = (octant, (end - self.taken).min(RAYS));
                 self.places[..self.count].copy_from_slice(&self.sorted[self.taken..self.taken + self.count]);
@@ -329,15 +354,15 @@ impl Groups {
         false
     }
 
-    /// Sorts the rays that wait by octants.
+    /// Sorts the rays that wait by cells.
     fn sort(&mut self) {
-        let mut next = [0; 8];
-        for octant in 1..8 {
-            next[octant] = next[octant - 1] + self.counts[octant - 1];
+        let mut next = [0; CELLS];
+        for cell in 1..CELLS {
+            next[cell] = next[cell - 1] + self.counts[cell - 1];
         }
         let waiting: usize = self.counts.iter().sum();
-        for &(at, octant) in &self.waiting[..waiting] {
-            let to = &mut next[octant as usize % 8];
+        for &(at, cell) in &self.waiting[..waiting] {
+            let to = &mut next[cell as usize % CELLS];
             self.sorted[*to % BLOCK_RAYS] = at;
             *to += 1;
         }

@@ -2,7 +2,7 @@
 //! give the same bits: the same operations in the same order, none of them fused.
 
 use super::wide::{Portable, Wide};
-use crate::kernels::trace::node::{FramedRay, node_hits, traversal_mask};
+use crate::kernels::trace::node::{FramedRay, NodeHits, node_hits, traversal_mask};
 use crate::kernels::vector::{Vec3, xyz};
 use bricks::Node;
 
@@ -71,6 +71,9 @@ pub trait Isa: Copy + Send + Sync {
     /// The traversal mask of a brick's node ([`traversal_mask`]): what `ray` enters of it up to `t_max`. `lanes` are
     /// the ray's.
     fn open(self, ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32;
+
+    /// [`node_hits`]; `lanes` are the ray's.
+    fn hits(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> NodeHits;
 }
 
 /// Numbers for which [`crate::math::exact::is_inside`] holds lie in these bounds, the upper one excluded.
@@ -130,6 +133,11 @@ impl Isa for Scalar {
         let entered = node_hits(ray, node, high, low, 0.0, t_max).mask;
         traversal_mask(entered, node, ray.flip)
     }
+
+    #[inline(always)]
+    fn hits(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> NodeHits {
+        node_hits(ray, node, xyz(lanes.offset_high), xyz(lanes.offset_low), slack, t_max)
+    }
 }
 
 /// [`Isa`] by the functions of the module where this is used. A value of `$name` is proof that the processor has their
@@ -153,6 +161,11 @@ macro_rules! isa_over_intrinsics {
             isa_over_intrinsics!(fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
                 open(ray, lanes, node, t_max)
             });
+            isa_over_intrinsics!(fn hits(
+                ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32
+            ) -> NodeHits {
+                hits(ray, lanes, node, slack, t_max)
+            });
 
             #[inline(always)]
             fn prefetch<T>(self, at: &T) {
@@ -162,7 +175,7 @@ macro_rules! isa_over_intrinsics {
             }
         }
     };
-    (fn $method:ident($($given:ident: $type:ty),*) -> $out:ty { $($body:tt)* }) => {
+    (fn $method:ident($($given:ident: $type:ty),* $(,)?) -> $out:ty { $($body:tt)* }) => {
         #[inline(always)]
         fn $method(self, $($given: $type),*) -> $out {
             // SAFETY: a value of the type exists only where the instructions have been detected.
@@ -226,6 +239,20 @@ impl Best {
         all.extend(Neon::detect().map(Self::Neon));
         println!("{all:?}");
         all
+    }
+
+    /// [`Isa::hits`], by a call: the caller need not be compiled for the instruction set.
+    #[inline]
+    pub fn hits(self, ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> NodeHits {
+        match self {
+            Self::Scalar(isa) => isa.hits(ray, lanes, node, slack, t_max),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(isa) => isa.hits(ray, lanes, node, slack, t_max),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(isa) => isa.hits(ray, lanes, node, slack, t_max),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(isa) => isa.hits(ray, lanes, node, slack, t_max),
+        }
     }
 
     /// Its name, and how many numbers are in a vector.

@@ -2,7 +2,8 @@
 
 use super::{Isa, Lanes};
 use crate::kernels::simd::wide::neon::{Eight, least_of_four as least, most_of_four as most};
-use crate::kernels::trace::node::{FramedRay, UNIT};
+use crate::kernels::trace::node::{FramedRay, NodeHits, UNIT, node_hits};
+use crate::kernels::vector::xyz;
 use bricks::Node;
 use std::arch::aarch64::*;
 
@@ -133,6 +134,12 @@ fn any(x: [uint32x4_t; 2]) -> u32 {
     let x = vorrq_u32(x[0], x[1]);
     let x = vget_lane_u64::<0>(vreinterpret_u64_u32(vorr_u32(vget_low_u32(x), vget_high_u32(x))));
     (x | x >> 32) as u32
+}
+
+/// Left to the compiler.
+#[target_feature(enable = "neon")]
+fn hits(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> NodeHits {
+    node_hits(ray, node, xyz(lanes.offset_high), xyz(lanes.offset_low), slack, t_max)
 }
 
 #[inline]

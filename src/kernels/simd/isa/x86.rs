@@ -2,7 +2,7 @@
 
 use super::{Isa, Lanes};
 use crate::kernels::simd::wide::x86::{Eight, Sixteen};
-use crate::kernels::trace::node::{FramedRay, UNIT};
+use crate::kernels::trace::node::{FramedRay, NodeHits, UNIT};
 use bricks::Node;
 use std::arch::x86_64::*;
 
@@ -87,17 +87,22 @@ fn extended(x: __m128) -> __m256 {
     _mm256_zextps128_ps256(x)
 }
 
-/// All bits set in the lanes of the children that `ray` enters: `NodeFrame::new` and `node_hits`.
+/// Where `ray` enters the children of a node, and where it leaves them: `NodeFrame::new` and `node_hits`, with
+/// `slack` where there is any.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> __m256i {
+fn distances_to(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: Option<f32>, t_max: f32) -> [__m256; 2] {
     let [p, s] = grid(node);
     let low = vector(&lanes.offset_low);
     let pc = _mm_add_ps(_mm_add_ps(p, vector(&lanes.offset_high)), low);
     let origin = vector(&lanes.origin);
     let w = _mm_sub_ps(pc, origin);
     let m = most3(_mm_add_ps(magnitude(w), _mm_mul_ps(_mm_set1_ps(255.0), s)));
-    let all = _mm_mul_ps(_mm_set1_ps(64.0 * UNIT), m);
+    let mut all = _mm_mul_ps(_mm_set1_ps(64.0 * UNIT), m);
+    if let Some(slack) = slack {
+        let o = most3(magnitude(origin));
+        all = _mm_add_ps(all, _mm_mul_ps(_mm_set1_ps(slack), _mm_add_ps(m, o)));
+    }
     let delta = _mm_add_ps(
         _mm_add_ps(all, _mm_mul_ps(_mm_set1_ps(4.0 * UNIT), magnitude(pc))),
         _mm_mul_ps(_mm_set1_ps(2.0 * UNIT), magnitude(low)),
@@ -126,7 +131,25 @@ fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> __m256i {
         _mm256_min_ps(distances(&bounds[1 - x][0], scale_x, far_x), distances(&bounds[1 - y][1], scale_y, far_y)),
         _mm256_min_ps(distances(&bounds[1 - z][2], scale_z, far_z), _mm256_set1_ps(t_max)),
     );
-    _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(tn, tf))
+    [tn, tf]
+}
+
+/// All bits set in the lanes of the children that `ray` enters.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn entered(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> __m256i {
+    let [near, far] = distances_to(ray, lanes, node, None, t_max);
+    _mm256_castps_si256(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far))
+}
+
+#[target_feature(enable = "avx2")]
+fn hits(ray: &FramedRay, lanes: &Lanes, node: &Node, slack: f32, t_max: f32) -> NodeHits {
+    let [near, far] = distances_to(ray, lanes, node, Some(slack), t_max);
+    let mask = _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far)) as u32;
+    let mut hits = NodeHits { near: [0.0; 8], mask };
+    // SAFETY: there is room for eight numbers.
+    unsafe { _mm256_storeu_ps(hits.near.as_mut_ptr(), near) };
+    hits
 }
 
 /// The lanes, all in one.
