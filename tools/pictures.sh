@@ -28,6 +28,11 @@ size=${SIZE:-1280x720}
 wants() { [[ $parts == *" $1 "* ]]; }
 has() { command -v "$1" >/dev/null; }
 
+# Asked before anything is rendered, for it is used last.
+if wants sheet || wants lights || wants study; then
+    python3 -c "import PIL" 2>/dev/null || { echo "python3 has no pillow: pip install pillow" >&2; exit 1; }
+fi
+
 # A picture: its name, the scene, the camera path, and more options.
 picture() {
     local name=$1 scene=$2 path=$3
