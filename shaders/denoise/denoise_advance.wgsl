@@ -65,19 +65,22 @@ fn main(
     var p = known[at];
     var light = lit[at].color;
     let is_sound_light = lit[at].variance != 0.0;
+    var spread = given[pixel].spreads[own.layer];
     let l = size(light);
     p.brightest = max(barrier(FADE * p.brightest), select(0.0, l, is_sound_light));
     if own.sparse != 0u && is_sound_light {
         let allowed = limit(place, pixel);
         if allowed.y != 0.0 && l > allowed.x {
-            let kept = light * divide(allowed.x, l);
+            let share = divide(allowed.x, l);
+            let kept = light * share;
             picture[pixel].w = luminance(given[pixel].albedo * (light - barrier3(kept)));
             light = barrier3(kept);
+            spread = barrier(spread * barrier(share * share));
             atomicAdd(&tally[DENOISE_FIREFLIES], 1u);
         }
     }
     if is_sound_light {
-        // Mean and spread by weights: West, "Updating Mean and Variance Estimates", CACM 1979.
+        // Mean and spread of samples by weights: West, "Updating Mean and Variance Estimates", CACM 1979.
         p.length = min(p.length + 1.0, LONG);
         let alpha = divide(1.0, p.length);
         let rest = 1.0 - alpha;
@@ -85,8 +88,9 @@ fn main(
         p.short = mixed(p.short, light, max(alpha, SHORT_SHARE));
         let delta = light - p.mean;
         p.mean = mixed(p.mean, light, alpha);
-        p.spread = barrier(rest * (p.spread + barrier(alpha * squared(delta))));
-        p.squares = barrier(barrier(rest * rest) * p.squares) + barrier(alpha * alpha);
+        p.spread = barrier(rest * (p.spread + barrier(alpha * squared(delta)))) + barrier(alpha * spread);
+        p.squares =
+            barrier(barrier(rest * rest) * p.squares) + divide(barrier(alpha * alpha), max(given[pixel].samples, 1.0));
     }
     p.count = 0.0;
     if p.squares > 0.0 {

@@ -1,11 +1,12 @@
-// Finds the variance of the averages of a layer: of lamps over frames, as soon as there is one; of sparse light by the
-// samples of a neighbourhood. Where these are too few to tell it, by how the averages differ around the pixel.
+// Finds the variance of the averages of a layer: of lamps by a pixel's samples, as soon as there are two; of sparse light
+// by the samples of a neighbourhood. Where these are too few to tell it, by how the averages differ around the pixel.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "denoise/denoise.wgsl"
 
-const FEW: f32 = 2.0;              // with fewer frames the variance of a lamp's light is that of the neighbourhood
+const FEW: f32 = 2.0;              // with fewer samples the variance of a lamp's light is that of the neighbourhood
 const LEAST_FOUND: f32 = 10.0;     // fewer samples that found light do not tell the variance of sparse light
+const DOUBTFUL: f32 = 30.0;        // of so many it may be twice what they tell: the rare and bright ones may be missing
 
 // Variance of the long averages around a pixel, about their mean.
 fn variance_around(place: vec2<i32>, surface: DenoiseSeen) -> f32 {
@@ -66,7 +67,8 @@ fn variance_pooled(place: vec2<i32>, surface: DenoiseSeen, squares: f32) -> f32 
     let of_mean = squared(divided(mean, freedom));
     let of_one = divide(sum, freedom);
     let found = divide(barrier(freedom * of_mean), max(of_mean + of_one, LEAST_NORMAL_NUMBER));
-    return select(-1.0, barrier(of_one * squares), found >= LEAST_FOUND);
+    let doubt = barrier(of_one * divide(DOUBTFUL, max(found, LEAST_FOUND)));
+    return select(-1.0, barrier((of_one + doubt) * squares), found >= LEAST_FOUND);
 }
 
 // One thread a pixel.
@@ -87,7 +89,7 @@ fn main(
     var variance = -1.0;
     if own.sparse != 0u {
         variance = variance_pooled(place, surface, p.squares);
-    } else if p.length >= FEW && p.count > 1.0 {
+    } else if p.count >= FEW {
         variance = divide(barrier(p.spread * p.squares), 1.0 - p.squares);
     }
     let is_untold = variance < 0.0;

@@ -28,8 +28,12 @@ struct DenoiseGiven {     // What a pixel is given beside that.
     direct: vec3<f32>,    // the light of lamps on it, reflected
     polish: f32,          // 1 / the angle within which what it mirrors is alike, radians; 0 where it mirrors little
     around: vec3<f32>,    // what goes around the filter
-    padding0: u32,
+    samples: f32,         // samples of the frame that show the surface
     shares: vec4<f32>,    // what that pixel, the next, and the two below weigh
+    // by layer the mean of the squared distances of the light of these samples, divided by the albedo, from their mean
+    spreads: vec2<f32>,
+    padding0: u32,
+    padding1: u32,
 }
 
 struct DenoiseSecond {    // The second surface of a pixel.

@@ -42,11 +42,13 @@ impl FrameOutput {
         if let Some(mut guides) = guides {
             let seen = std::mem::take(&mut guides.seen);
             let second = std::mem::take(&mut guides.second);
+            let noise = std::mem::take(&mut guides.noise);
             let [direct, around] = [&mut guides.direct, &mut guides.around].map(std::mem::take);
             let all = self.guides.get_or_insert(guides);
             joint.join(&mut all.seen, seen);
             joint.join(&mut all.direct, direct);
             joint.join(&mut all.around, around);
+            joint.join(&mut all.noise, noise);
             joint.join(&mut all.second, second);
         }
     }

@@ -1,6 +1,7 @@
 //! What a frame saw: what guides denoising and anti-aliasing.
 
 use super::Moved;
+use crate::kernels::denoise::{LEAST_ALBEDO, difference, mixed, squared};
 use crate::kernels::layout::{BATCH_SAMPLES, GBuffer, Hit, NONE, Ray, Surface};
 use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::{FrameExecutor, View};
@@ -39,6 +40,16 @@ pub struct Second {
     pub light: [f32; 3],
 }
 
+/// How the light on a pixel's first surface differs from sample to sample of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SampleNoise {
+    /// Samples that saw the surface.
+    pub samples: u32,
+    /// Of the light of sun and emitters and of all other light, divided by the albedo: the mean of the squared distances
+    /// from the samples' mean ([`crate::kernels::denoise::squared`]).
+    pub spreads: [f32; 2],
+}
+
 impl Seen {
     /// Whether a surface was seen.
     pub fn is_hit(&self) -> bool {
@@ -75,6 +86,8 @@ pub struct Guides {
     /// The rest beside what the first surface reflects of other light, the mean over the samples: what hits show by
     /// themselves, the background, and all light on other surfaces.
     pub around: Vec<[f32; 3]>,
+    /// How the light on the first surface differs from sample to sample.
+    pub noise: Vec<SampleNoise>,
     /// The second surface, where samples saw another than the first one did.
     pub second: Vec<Option<Second>>,
     /// What has moved since the frame before.
@@ -131,6 +144,30 @@ struct Sums {
     samples: u32,
     /// What the sample at hand sees.
     which: Which,
+    /// The albedo there.
+    albedo: [f32; 3],
+    /// Samples that saw the first surface.
+    firsts: u32,
+    /// Of the light of lamps on it, and of other light.
+    spreads: [Spread; 2],
+}
+
+/// Mean of light divided by the albedo, and the sum of the squared distances from it, by Welford's recurrence.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spread {
+    mean: [f32; 3],
+    squares: f32,
+}
+
+impl Spread {
+    /// Takes the light of the sample of this number, from 1, on a surface of this albedo.
+    fn push(&mut self, light: [f64; 3], albedo: [f32; 3], number: u32) {
+        let light = [0, 1, 2].map(|k| if albedo[k] < LEAST_ALBEDO { 0.0 } else { light[k] as f32 / albedo[k] });
+        let share = 1.0 / number as f32;
+        let off = difference(light, self.mean);
+        self.mean = mixed(self.mean, light, share);
+        self.squares += squared(off) * (1.0 - share);
+    }
 }
 
 impl Sums {
@@ -138,6 +175,12 @@ impl Sums {
     fn lamps(&mut self, added: [f64; 3], which: Which, seen: &Seen, emission: [f32; 3]) {
         self.samples += 1;
         self.which = which;
+        if which == Which::First {
+            self.albedo = seen.albedo;
+            self.firsts += 1;
+            let reflected = [0, 1, 2].map(|k| added[k] - f64::from(emission[k]));
+            self.spreads[0].push(reflected, seen.albedo, self.firsts);
+        }
         for (k, added) in added.into_iter().enumerate() {
             let [emission, albedo] = [emission[k], seen.albedo[k]].map(f64::from);
             match which {
@@ -158,10 +201,19 @@ impl Sums {
 
     /// Takes all other light of the sample.
     fn rest(&mut self, added: [f64; 3]) {
+        if self.which == Which::First {
+            self.spreads[1].push(added, self.albedo, self.firsts);
+        }
         for (k, added) in added.into_iter().enumerate() {
             self.around[k] += if self.which == Which::First { 0.0 } else { added };
             self.second[k] += if self.which == Which::Second { added } else { 0.0 };
         }
+    }
+
+    /// How samples differ.
+    fn noise(&self) -> SampleNoise {
+        let spreads = self.spreads.map(|spread| spread.squares / self.firsts.max(1) as f32);
+        SampleNoise { samples: self.firsts, spreads }
     }
 
     /// A sum's mean over the samples.
@@ -307,11 +359,12 @@ impl GuideReader {
         seen.iter_mut().zip(&sums).for_each(|(seen, sums)| seen.albedo = sums.mean(sums.albedos[0]));
         let [direct, around] = [|sums: &Sums| sums.mean(sums.direct), |sums: &Sums| sums.mean(sums.around)]
             .map(|of| sums.iter().map(of).collect());
+        let noise = sums.iter().map(Sums::noise).collect();
         let second = second.iter().zip(&sums).map(|(second, sums)| {
             let of = |seen: &Seen| Seen { albedo: sums.mean(sums.albedos[1]), ..*seen };
             second.as_ref().map(|seen| Second { seen: of(seen), light: sums.mean(sums.second) })
         });
-        Guides { size, projection, jitter, seen, direct, around, second: second.collect(), moved }
+        Guides { size, projection, jitter, seen, direct, around, noise, second: second.collect(), moved }
     }
 }
 

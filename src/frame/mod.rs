@@ -34,7 +34,7 @@ pub use effects::{Effects, Occlusion};
 pub use emissive::{MOST_TRIANGLES, ShiningTriangles, emissive_triangles};
 pub use engine::{Engine, FrameBudget, RenderSettings, Schedule};
 pub use environment::{EnvironmentNotes, Equirectangular, environment, luminance};
-pub use guides::{GuideReader, Guides, Second, Seen};
+pub use guides::{GuideReader, Guides, SampleNoise, Second, Seen};
 pub use light::Light;
 pub use moved::{InstanceMotion, Moved};
 pub use pass_record::FrameRecords;

@@ -1,7 +1,7 @@
 //! How much memory the pictures of a session take. Of a picture that is rendered in bands, rays and what shading keeps
 //! are those of one band; what is joined of all of them is on the host.
 
-use crate::frame::{Second, Seen};
+use crate::frame::{SampleNoise, Second, Seen};
 use crate::kernels::denoise;
 use crate::kernels::layout::{DenoiseGiven, DenoiseSecond, DenoiseSeen, GBuffer, Hit, Ray, Surface};
 use crate::session::Settings;
@@ -27,7 +27,7 @@ pub struct PictureBytes {
 /// Of the sums of a frame's samples in f64, of what is read back and of their mean.
 const SUMS: u64 = 32 + 16 + 12;
 /// Of the sums that guides keep, of radiance before and after the lamps, of second surfaces, and of what a sample saw.
-const GUIDE_SUMS: u64 = 136 + 32 + 2 * size_of::<Option<Seen>>() as u64 + 12;
+const GUIDE_SUMS: u64 = 184 + 32 + 2 * size_of::<Option<Seen>>() as u64 + 12;
 /// Of the noise of a pixel's samples, and of what is read back to find it.
 const NOISE: u64 = 12 + 16;
 /// Of the mean of the samples, and whether a surface was seen.
@@ -52,7 +52,11 @@ impl PictureBytes {
         let bounces = if settings.effects.diffuse || settings.effects.glossy { set + shading + 20 } else { 0 };
         let device = 2 * set + shading + 16 + bounces;
         let has_guides = settings.denoise || settings.taa;
-        let guides = if has_guides { 2 * (size_of::<Seen>() + size_of::<Option<Second>>() + 12) as u64 } else { 0 };
+        let guides = if has_guides {
+            2 * (size_of::<Seen>() + size_of::<SampleNoise>() + size_of::<Option<Second>>() + 12) as u64
+        } else {
+            0
+        };
         let (given, filter) = if settings.denoise { (FILTER, denoise::bytes_a_pixel()) } else { (0, 0) };
         let read = if settings.aov || has_guides { set + shading } else { 0 };
         let (aovs, layers) = if settings.aov { (AOVS, AOV_LAYERS) } else { (0, 0) };

@@ -2,7 +2,7 @@
 
 use super::buffers::Buffers;
 use super::grid::{Grid, difference, is_same, luminance, mixed, size, squared};
-use crate::kernels::layout::{DENOISE_FIREFLIES, DenoiseLit, DenoiseOwn, DenoisePast, DenoiseSeen};
+use crate::kernels::layout::{DENOISE_FIREFLIES, DenoiseGiven, DenoiseLit, DenoiseOwn, DenoisePast, DenoiseSeen};
 use crate::math::exact::{divide, square_root};
 use rayon::prelude::*;
 
@@ -43,10 +43,10 @@ fn limit(grid: Grid, seen: &[DenoiseSeen], light: &[DenoiseLit], known: &[Denois
     Some((mean + DEVIATIONS * deviation).max(most))
 }
 
-/// Takes a frame's light into the averages of a pixel, and into mean and spread by weights: Welford's recurrence as
-/// West has it ("Updating Mean and Variance Estimates", CACM 1979). No difference of large numbers is taken, so that a
-/// spread far below the mean stays right.
-pub fn push(p: &mut DenoisePast, light: [f32; 3]) {
+/// Takes a frame's light into the averages of a pixel, and its samples, which are so many and have this spread about
+/// their mean, into mean and spread by weights: Welford's recurrence as West has it ("Updating Mean and Variance
+/// Estimates", CACM 1979). No difference of large numbers is taken, so that a spread far below the mean stays right.
+pub fn push(p: &mut DenoisePast, light: [f32; 3], (samples, spread): (f32, f32)) {
     p.length = (p.length + 1.0).min(LONG);
     let alpha = divide(1.0, p.length);
     let rest = 1.0 - alpha;
@@ -54,8 +54,8 @@ pub fn push(p: &mut DenoisePast, light: [f32; 3]) {
     p.short = mixed(p.short, light, alpha.max(SHORT_SHARE));
     let delta = difference(light, p.mean);
     p.mean = mixed(p.mean, light, alpha);
-    p.spread = rest * (p.spread + alpha * squared(delta));
-    p.squares = rest * rest * p.squares + alpha * alpha;
+    p.spread = rest * (p.spread + alpha * squared(delta)) + alpha * spread;
+    p.squares = rest * rest * p.squares + divide(alpha * alpha, samples.max(1.0));
 }
 
 /// Cuts fireflies of a layer, and takes its light into the averages.
@@ -65,13 +65,13 @@ pub fn advance(own: &DenoiseOwn, buffers: &mut Buffers) {
     let (seen, given, pixels) = (*seen, *given, grid.pixels());
     let (known, light) = (&known[layer * pixels..][..pixels], &lit[layer * pixels..][..pixels]);
     let past = &mut past[layer * pixels..][..pixels];
-    // What is left of a firefly.
+    // What is left of a firefly, as a share.
     let kept = |pixel: usize| {
         let DenoiseLit { color, variance } = light[pixel];
         let l = size(color);
         let is_cut = own.sparse != 0 && variance != 0.0 && seen[pixel].is_hit();
         let most = if is_cut { limit(grid, seen, light, known, pixel) } else { None };
-        most.filter(|&most| l > most).map(|most| color.map(|x| x * divide(most, l)))
+        most.filter(|&most| l > most).map(|most| divide(most, l))
     };
     let fireflies = past.par_iter_mut().zip(picture.par_iter_mut()).enumerate().with_min_len(256);
     let fireflies = fireflies.map(|(pixel, (past, picture))| {
@@ -83,14 +83,16 @@ pub fn advance(own: &DenoiseOwn, buffers: &mut Buffers) {
         let DenoiseLit { color, variance } = light[pixel];
         let is_sound = variance != 0.0;
         p.brightest = (FADE * p.brightest).max(if is_sound { size(color) } else { 0.0 });
-        let kept = kept(pixel);
-        if let Some(kept) = kept {
-            let albedo = given[pixel].albedo;
-            let lost = difference(color, kept);
+        let DenoiseGiven { albedo, samples, spreads, .. } = given[pixel];
+        let (kept, mut light, mut spread) = (kept(pixel), color, spreads[layer]);
+        if let Some(share) = kept {
+            light = color.map(|x| x * share);
+            let lost = difference(color, light);
             picture[3] = luminance([0, 1, 2].map(|k| albedo[k] * lost[k]));
+            spread *= share * share;
         }
         if is_sound {
-            push(&mut p, kept.unwrap_or(color));
+            push(&mut p, light, (samples, spread));
         }
         p.count = if p.squares > 0.0 { divide(1.0, p.squares) } else { 0.0 };
         *past = p;

@@ -12,6 +12,7 @@ mod vary;
 
 pub use advance::push;
 pub use buffers::{BUFFERS, LAYERS, LEAST_ALBEDO, TALLIES};
+pub use grid::{difference, mixed, squared};
 pub use vary::variance_of_mean;
 
 use super::bound::Bound;

@@ -6,10 +6,12 @@ use crate::kernels::layout::{DenoiseLit, DenoiseOwn, DenoisePast, DenoiseSeen};
 use crate::math::exact::divide;
 use rayon::prelude::*;
 
-/// With fewer frames the variance of a lamp's light is that of the neighbourhood.
+/// With fewer samples the variance of a lamp's light is that of the neighbourhood.
 const FEW: f32 = 2.0;
 /// The variance of sparse light is not told by a neighbourhood with fewer samples that found light.
 const LEAST_FOUND: f32 = 10.0;
+/// Samples that found light, of which a variance may be twice what they tell: the rare and bright ones may be missing.
+const DOUBTFUL: f32 = 30.0;
 
 /// Variance of the long averages around `pixel`, about their mean.
 fn variance_around(grid: Grid, seen: &[DenoiseSeen], known: &[DenoisePast], pixel: usize, radius: i32) -> f32 {
@@ -49,7 +51,7 @@ fn variance_pooled(grid: Grid, seen: &[DenoiseSeen], known: &[DenoisePast], pixe
     let of_mean = squared(divided(mean, freedom));
     let of_one = divide(sum, freedom);
     let found = divide(freedom * of_mean, (of_mean + of_one).max(f32::MIN_POSITIVE));
-    (found >= LEAST_FOUND).then(|| of_one * known[pixel].squares)
+    (found >= LEAST_FOUND).then(|| (of_one + of_one * divide(DOUBTFUL, found)) * known[pixel].squares)
 }
 
 /// The variance of the mean of independent values, by their own spread; of fewer than two there is none.
@@ -67,7 +69,7 @@ pub fn vary(own: &DenoiseOwn, buffers: &mut Buffers) {
         let p = &known[pixel];
         let told = match own.sparse != 0 {
             true => variance_pooled(grid, seen, known, pixel, radius),
-            false => variance_of_mean(p).filter(|_| p.length >= FEW),
+            false => variance_of_mean(p).filter(|_| p.count >= FEW),
         };
         let variance = told.unwrap_or_else(|| variance_around(grid, seen, known, pixel, radius));
         (DenoiseLit { color: p.long, variance }, u32::from(told.is_none() && own.sparse != 0))
@@ -87,7 +89,7 @@ mod tests {
     fn of(values: impl IntoIterator<Item = [f32; 3]>) -> DenoisePast {
         let mut p = DenoisePast::default();
         for value in values {
-            push(&mut p, value);
+            push(&mut p, value, (1.0, 0.0));
         }
         if p.squares > 0.0 {
             p.count = divide(1.0, p.squares);

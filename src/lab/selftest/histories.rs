@@ -99,7 +99,7 @@ fn history_variance(lab: &mut Lab, checks: &mut Checks) -> Result<()> {
             // The sum of twelve even numbers has variance 1.
             let normal = (0..12).map(|_| random.unit()).sum::<f64>() - 6.0;
             let value = (1e5 + normal) as f32;
-            push(&mut past, [value; 3]);
+            push(&mut past, [value; 3], (1.0, 0.0));
             let alpha = 1.0 / f64::from((k + 1).min(12));
             values.iter_mut().for_each(|(_, weight)| *weight *= 1.0 - alpha);
             values.push((f64::from(value), alpha));

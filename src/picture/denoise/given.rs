@@ -47,8 +47,9 @@ impl Given {
         for (number, (pixel, _)) in (0..).zip(&shown) {
             seen[*pixel].second = number;
         }
-        let pixels = guides.seen.par_iter().zip(&guides.direct).zip(&guides.around).enumerate().with_min_len(1024);
-        let given = pixels.map(|(pixel, ((seen, direct), around))| {
+        let light = guides.direct.par_iter().zip(&guides.around).zip(&guides.noise);
+        let pixels = guides.seen.par_iter().zip(light).enumerate().with_min_len(1024);
+        let given = pixels.map(|(pixel, (seen, ((direct, around), noise)))| {
             let taps = before.and_then(|before| reproject(guides, pixel, before));
             let Taps { before, shares } = taps.unwrap_or_default();
             DenoiseGiven {
@@ -57,7 +58,9 @@ impl Given {
                 direct: *direct,
                 polish: seen.polish,
                 around: *around,
+                samples: noise.samples as f32,
                 shares,
+                spreads: noise.spreads,
                 ..Default::default()
             }
         });

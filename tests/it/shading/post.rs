@@ -1,7 +1,7 @@
 //! Denoising and temporal anti-aliasing, frame after frame, against pictures of many samples.
 
 use crate::common;
-use brickwalk::frame::{Equirectangular, FrameOutput, Guides, Light, Moved, Renderer, Seen, environment};
+use brickwalk::frame::{Equirectangular, FrameOutput, Guides, Light, Moved, Renderer, SampleNoise, Seen, environment};
 use brickwalk::kernels::Lamps;
 use brickwalk::metrics::{Image, PIXELS_PER_DEGREE, flip_ldr};
 use brickwalk::picture::denoise::{Denoiser, Taa};
@@ -286,6 +286,38 @@ fn light_of_an_environment_loses_its_noise_and_its_wrong_colours() {
     assert!(control > 1.1 * after && kept > 2.0 * left, "as lamps FLIP {control}, {after}; RMSE {kept}, {left}");
 }
 
+/// A frame of many samples needs little of what lies around, and its samples tell how little.
+#[test]
+fn samples_of_a_frame_tell_its_variance() {
+    let folder = common::folder();
+    let scene = court(folder.path());
+    for effects in ["ao", "shadow,diffuse"] {
+        let options = format!("--effects {effects} --ao-rays 1 --ao-length 2 --denoise --diffuse-rays 1 --spp 16");
+        let mut renderer = renderer_of(&scene, &options);
+        let mut output = renderer.frame(0, &eye(0)).expect("a frame");
+        let (guides, input) = (guides(&mut output), output.pixels.radiance);
+        let frames: Vec<_> = (1..65).map(|k| renderer.frame(k, &eye(0)).expect("a frame").pixels.radiance).collect();
+        let mean = |i: usize| [0, 1, 2].map(|k| frames.iter().map(|frame| frame[i][k]).sum::<f32>() / 64.0);
+        let truth: Vec<[f32; 3]> = (0..WIDTH * HEIGHT).map(mean).collect();
+        let filtered = |guides: &Guides| {
+            let mut radiance = input.clone();
+            Denoiser::default().frame(guides.clone(), &mut radiance);
+            radiance
+        };
+        // The control: told that the frame has one sample a pixel.
+        let untold = Guides { noise: vec![SampleNoise::default(); WIDTH * HEIGHT], ..guides.clone() };
+        let pictures = [input.clone(), filtered(&guides), filtered(&untold)];
+        let [noise, left, control] = pictures.each_ref().map(|picture| rmse(picture, &truth));
+        let [before, after, blurred] = pictures.each_ref().map(|picture| flip(picture, &truth));
+        println!(
+            "{effects}: RMSE {noise:.4} to {left:.4}, untold {control:.4}; FLIP {before:.4} to {after:.4}, {blurred:.4}"
+        );
+        assert!(left < 0.8 * noise, "{effects}: RMSE {noise} to {left}");
+        let told = control > 2.0 * left && blurred > 2.0 * after;
+        assert!(told, "{effects}: RMSE {left}, untold {control}; FLIP {after}, untold {blurred}");
+    }
+}
+
 /// Of pixels whose samples see several surfaces, or a surface and the sky, the filter changes the first one's light
 /// alone.
 #[test]
@@ -357,6 +389,7 @@ fn fireflies_of_any_colour_are_cut() {
         seen: (0..WIDTH * HEIGHT).map(seen).collect(),
         direct: vec![[0.0; 3]; WIDTH * HEIGHT],
         around: vec![[0.0; 3]; WIDTH * HEIGHT],
+        noise: vec![SampleNoise::default(); WIDTH * HEIGHT],
         second: Vec::new(),
         moved: Moved::default(),
     };
