@@ -1,5 +1,6 @@
-// Finds the variance of the averages of a layer: of lamps by a pixel's samples, as soon as there are two; of sparse light
-// by the samples of a neighbourhood. Where these are too few to tell it, by how the averages differ around the pixel.
+// Finds the variance of the averages of a layer: of lamps by a pixel's samples, as soon as there are two; of sparse
+// light by the samples of a neighbourhood. Where these are too few to tell it, by how the averages differ around the
+// pixel.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "denoise/denoise.wgsl"

@@ -45,8 +45,8 @@ pub struct Second {
 pub struct SampleNoise {
     /// Samples that saw the surface.
     pub samples: u32,
-    /// Of the light of sun and emitters and of all other light, divided by the albedo: the mean of the squared distances
-    /// from the samples' mean ([`crate::kernels::denoise::squared`]).
+    /// Of the light of sun and emitters and of all other light, divided by the albedo: the mean of the squared
+    /// distances from the samples' mean ([`crate::kernels::denoise::squared`]).
     pub spreads: [f32; 2],
 }
 
