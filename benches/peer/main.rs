@@ -11,6 +11,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod judge;
 mod obvhs_trees;
 mod ours;
 mod plot;
@@ -18,6 +19,7 @@ mod program;
 mod table;
 
 use brickwalk::kernels::layout::Ray;
+use judge::{Case, Corners};
 use obvhs_trees::Trees;
 use ours::{Ours, Scene, squares};
 use program::Program;
@@ -77,14 +79,21 @@ fn city(triangles: &str) -> PathBuf {
     path
 }
 
-/// The share of the rays on whose hit two do not agree: whether there is one, or where.
-fn apart(a: &[f32], b: &[f32], traced: usize) -> f64 {
+/// The rays of a city in the order of [`squares`], and its triangles.
+struct Input {
+    rays: [Vec<Ray>; 3],
+    triangles: Vec<Corners>,
+}
+
+/// The rays on whose hit two do not agree: whether there is one, or where.
+fn apart(a: &[f32], b: &[f32]) -> Vec<usize> {
     let differ = |a: f32, b: f32| a.is_finite() != b.is_finite() || (a - b).abs() > NEAR * a.max(b);
-    a.iter().zip(b).filter(|(a, b)| differ(**a, **b)).count() as f64 / traced as f64
+    (0..a.len()).filter(|&ray| differ(a[ray], b[ray])).collect()
 }
 
 /// All peers in turns, with one thread and with all.
-fn measure(peers: &mut [Box<dyn Peer>], set: usize, traced: usize, threads: usize) -> Vec<Timed> {
+fn measure(peers: &mut [Box<dyn Peer>], input: &Input, set: usize, traced: usize, threads: usize) -> Vec<Timed> {
+    let rays = &input.rays[set];
     let mut columns: Vec<(usize, usize, Timed)> = Vec::new();
     for (peer, of) in peers.iter().enumerate() {
         let mut first_mode = 0;
@@ -106,13 +115,19 @@ fn measure(peers: &mut [Box<dyn Peer>], set: usize, traced: usize, threads: usiz
                     distances.clone_from(&alone.distances);
                 }
                 for found in [&alone, &together] {
-                    timed.apart = timed.apart.max(apart(&distances, &found.distances, traced));
+                    let apart = apart(&distances, &found.distances);
+                    let share = apart.len() as f64 / traced as f64;
+                    let (title, set) = (&timed.title, SETS[set]);
+                    assert!(share <= MOST_APART, "{title}, {set}: {share} of the rays have other hits than ours");
+                    if apart.len() > timed.apart.len() {
+                        let case = |ray: usize| Case { ray: rays[ray], found: [distances[ray], found.distances[ray]] };
+                        timed.apart = apart.into_iter().map(case).collect();
+                    }
                 }
             }
-            let Timed { title, apart, .. } = timed;
-            assert!(*apart <= MOST_APART, "{title}, {}: {apart} of the rays have other hits than ours", SETS[set]);
         }
     }
+    columns.iter_mut().for_each(|(_, _, timed)| timed.right = judge::right(&timed.apart, &input.triangles, set == 1));
     columns.into_iter().map(|(_, _, timed)| timed).collect()
 }
 
@@ -146,15 +161,16 @@ fn main() {
         let traced = scene.sets.each_ref().map(traced);
         let rays = scene.sets.each_ref().map(|rays| squares().into_iter().map(|pixel| rays[pixel]).collect());
         drop(scene);
+        let input = Input { triangles: ours::triangles(&dump, &rays), rays };
         let mut peers: Vec<Box<dyn Peer>> = vec![Box::new(Ours::new(&path))];
         for program in &programs {
-            peers.push(Box::new(Program::new(program, &dump, rays.each_ref().map(Vec::len)[0])));
+            peers.push(Box::new(Program::new(program, &dump, input.rays[0].len())));
         }
-        peers.push(Box::new(Trees::new(&dump, rays)));
+        peers.push(Box::new(Trees::new(&input.triangles, input.rays.clone())));
         std::fs::remove_file(&dump).expect("its own file");
         for (set, name) in SETS.into_iter().enumerate() {
             eprintln!("{city_of}, {name} ...");
-            let columns = measure(&mut peers, set, traced[set], threads);
+            let columns = measure(&mut peers, &input, set, traced[set], threads);
             rows.push(Row { city: city_of.clone(), triangles, set, traced: traced[set], columns });
         }
     }

@@ -1,5 +1,6 @@
 //! The crate obvhs as a peer: single rays through its binary and its compressed wide BVH.
 
+use super::judge::Corners;
 use super::{Column, Measured, Peer, processor_seconds};
 use brickwalk::kernels::layout::Ray;
 use glam::{UVec2, Vec3A};
@@ -9,7 +10,6 @@ use obvhs::cwbvh::{CwBvh, builder::build_cwbvh_from_tris};
 use obvhs::ray::RayHit;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
-use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -103,14 +103,10 @@ pub struct Trees {
 }
 
 impl Trees {
-    /// Of the triangles of a dump, whose rays are `sets`.
-    pub fn new(dump: &Path, sets: [Vec<Ray>; 3]) -> Self {
-        let bytes = std::fs::read(dump).expect("the dump");
-        let corners = 2 * size_of::<u32>() + sets.iter().map(|rays| size_of_val(&rays[..])).sum::<usize>();
-        let triangles: Vec<[[f32; 3]; 3]> = bytemuck::pod_collect_to_vec(&bytes[corners..]);
-        drop(bytes);
+    /// Of these triangles, for these rays.
+    pub fn new(triangles: &[Corners], sets: [Vec<Ray>; 3]) -> Self {
         let triangles: Vec<Triangle> = triangles
-            .into_iter()
+            .iter()
             .map(|corners| {
                 let [v0, v1, v2] = corners.map(Vec3A::from);
                 Triangle { v0, v1, v2 }

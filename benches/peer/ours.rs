@@ -1,5 +1,6 @@
 //! The processor's kernels as a peer, and the dump that other peers read.
 
+use super::judge::Corners;
 use super::{Column, Measured, OCCLUSION_LENGTH, Peer, START, processor_seconds};
 use bricks::Payload;
 use brickwalk::Settings;
@@ -154,6 +155,13 @@ impl Scene {
         file.flush()?;
         Ok(count)
     }
+}
+
+/// The triangles of a dump with these rays.
+pub fn triangles(dump: &Path, sets: &[Vec<Ray>; 3]) -> Vec<Corners> {
+    let bytes = std::fs::read(dump).expect("the dump");
+    let corners = 2 * size_of::<u32>() + sets.iter().map(|rays| size_of_val(&rays[..])).sum::<usize>();
+    bytemuck::pod_collect_to_vec(&bytes[corners..])
 }
 
 fn pass_of(set: usize) -> Pass {

@@ -1,6 +1,7 @@
 //! Times of the turns, and the tables of rates.
 
 use super::common::median;
+use super::judge::Case;
 use super::{Column, SETS};
 
 /// A mode's seconds, turn by turn.
@@ -17,14 +18,16 @@ pub struct Mode {
 pub struct Timed {
     pub title: String,
     pub modes: Vec<Mode>,
-    /// The largest share of the rays on whose hit it and ours differ.
-    pub apart: f64,
+    /// The rays on whose hit it and ours differ, of the mode where most do.
+    pub apart: Vec<Case>,
+    /// In how many of them ours and it find what f64 finds.
+    pub right: [usize; 2],
 }
 
 impl Timed {
     pub fn new(column: &Column) -> Self {
         let modes = column.modes.iter().map(|name| Mode { name: name.clone(), ..Mode::default() });
-        Self { title: column.title.clone(), modes: modes.collect(), apart: 0.0 }
+        Self { title: column.title.clone(), modes: modes.collect(), apart: Vec::new(), right: [0; 2] }
     }
 
     /// The times of the mode with the least median.
@@ -94,9 +97,12 @@ pub fn print(rows: &[Row], threads: usize) {
             row.with_ratio(k, format!("{rate:.2}"), |mode| &mode.wall)
         });
     }
-    head("Rays of a million on whose hit they and ours differ, the worst mode:", titles().skip(1));
+    let title =
+        "Rays on whose hit they and ours differ, the worst mode; of them those where ours, and they, are right in f64:";
+    head(title, titles().skip(1));
     for row in rows {
-        let cells: Vec<String> = row.columns[1..].iter().map(|column| format!("{:.0}", 1e6 * column.apart)).collect();
+        let cell = |column: &Timed| format!("{}: {}, {}", column.apart.len(), column.right[0], column.right[1]);
+        let cells: Vec<String> = row.columns[1..].iter().map(cell).collect();
         println!("| {} | {} | {} |", row.city, SETS[row.set], cells.join(" | "));
     }
 }
