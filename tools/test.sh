@@ -12,6 +12,8 @@ if [ -z "${BRICKWALK_SKIPPED:-}" ]; then
     trap 'rm -f "$BRICKWALK_SKIPPED"' EXIT
 fi
 export BRICKWALK_SKIPPED
+# Tests wait for programs that they start, so that a thread more than there are cores keeps these busy.
+export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$(($(nproc 2>/dev/null || echo 1) + 1))}
 status=0
 cargo test --release --workspace --manifest-path "$root/Cargo.toml" "$@" || status=$?
 tell_skipped || true
