@@ -19,11 +19,6 @@ fn zero_bits() -> u32 {
     return params.zero;
 }
 
-// The pixel of the picture that a ray belongs to: random numbers are drawn by it, not by the ray's place in a band.
-fn pixel_of(index: u32) -> u32 {
-    return params.first_row * params.width + index;
-}
-
 // Starts a ray's hit: nothing found within its range; triangle `source`, from which it starts, is not met (NONE: of
 // none).
 fn start_hit(ray: u32, t_max: f32, source: u32) {

@@ -27,7 +27,14 @@ struct Surface {          // Where a hit lies, for the rays that start from it.
     // are those of an f32 below 2, without its sign: the square of what its cone spreads by beyond its pass's
     // (levels.wgsl); bit 31 is PENDING_MISSING
     pending: u32,
-    emitter: u32,         // of rays to emitters: theirs; of rays to the environment: the number of their candidate
+    // of rays to emitters: theirs; of rays to the environment: the number of their candidate; of what is reflected:
+    // bits of the curvature of the surface that it starts from (GBuffer)
+    emitter: u32,
+}
+
+struct Origin {           // Where the path of a ray of set 1 comes from.
+    pixel: u32,           // its pixel's number in the band
+    direction: u32,       // number of the direction that it began with
 }
 
 struct TileBounds {       // Bounds of the traced rays of a tile.
@@ -112,6 +119,7 @@ const COUNTER_UNRESOLVED: u32 = 20u;
 const COUNTER_RAYS_ANSWERED: u32 = 21u;
 const COUNTER_PILOTS: u32 = 22u;    // rays sifted and yet traced; then those wrongly free, wrongly met by HANDOVERS
 const COUNTER_RAYS_SHORTENED: u32 = 30u; // rays of which a part is answered and the rest traced
+const COUNTER_PATHS: u32 = 31u;    // paths that go on
 const WORK_CHOSEN: u32 = 32u;      // the workgroups over chosen tiles: in x, y and z, and how many of them have work
 const WORK_ROOTED: u32 = 36u;      // the same over tiles whose rays walk from the root
 const MET: u32 = 0xfffffffeu;         // id of a hit that a method of secondary visibility gives, which is no triangle

@@ -70,7 +70,7 @@ struct GBuffer {          // what shading reads of a primary hit
     metallic: f32,        // factor times texture
     roughness: f32,       // factor times texture
     padding0: u32,        // with DVF_PAPER: 1 where its cell is mostly occluded
-    padding1: u32,
+    curvature: f32,       // size of the Gaussian curvature that the vertices' normals have, per square of a device unit
 }
 
 struct More {             // what the further textures of a hit's material show, and its coat's normal

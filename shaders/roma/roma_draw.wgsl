@@ -18,7 +18,7 @@ fn turn(index: u32, direction: vec3<f32>) {
     if (params.flags & PARAM_ANY_HIT) == 0u {
         rays[index].direction = direction;
         // 0.3183… is 1 / pi.
-        densities[index] = params.diffuse_count * max(dot(gbuffer[index].normal, direction), 0.0) * 0.31830987;
+        throughput[index].w = params.diffuse_count * max(dot(gbuffer[index].normal, direction), 0.0) * 0.31830987;
     }
 }
 

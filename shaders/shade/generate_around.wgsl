@@ -2,7 +2,7 @@
 // within limits (CHC+RT §5.3), or, scattered, moved over the whole hemisphere by a random step in the two numbers that
 // it comes from (Cranley and Patterson 1976: the turn, and the square of the sine); where that leads below the surface,
 // none. Limited rays ask for occlusion; for the others the throughput is noted: what of light from around the surface
-// reflects, by the share of the direction; in w the direction's number.
+// reflects, by the share of the direction; in w the density of the direction.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
@@ -52,8 +52,9 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     rays[index] = ray;
     if !LIMITED {
-        throughput[index] = vec4<f32>(carried, f32(params.direction));
-        densities[index] = params.diffuse_count * max(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
+        let density = params.diffuse_count * max(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
+        throughput[index] = vec4<f32>(carried, density);
+        origins[index] = Origin(index, params.direction);
     }
     start_hit(index, ray.t_max, seen_hits[index].id);
 }

@@ -22,6 +22,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var carried = vec3<f32>(0.0);
     var density = 0.0;
     var alpha = 0.0;
+    var curvature = 0.0;
     if surface.leaf != NONE {
         let g = gbuffer[index];
         let s = gloss_of(g, index, -seen_rays[index].direction);
@@ -40,6 +41,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
                 if is_through {
                     carried = passed(s, ray.direction) * radiance_scale(s);
                 } else {
+                    curvature = g.curvature;
                     carried = reflected(s, ray.direction) * (dot(g.normal, ray.direction) / (PI * density));
                 }
                 carried *= left_within(g, seen_hits[index].t * length(seen_rays[index].direction));
@@ -47,10 +49,11 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
         }
     }
     rays[index] = ray;
-    throughput[index] = vec4<f32>(carried, 0.0);
-    densities[index] = density;
+    throughput[index] = vec4<f32>(carried, density);
+    origins[index] = Origin(index, 0u);
     start_hit(index, ray.t_max, seen_hits[index].id);
+    surfaces[index].emitter = bitcast<u32>(curvature);
     if alpha > 0.0 {
-        widen_reflected(index, density, alpha);
+        widen_reflected(index, density, alpha, curvature);
     }
 }

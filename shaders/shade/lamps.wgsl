@@ -26,11 +26,11 @@ fn unit(word: u32) -> f32 {
 }
 
 // Which random numbers the ray of a pixel takes to draw candidate `number` for a lamp: those that start at hits of
-// bounces take some of their own in every direction of the bounce, whose number lies in the throughput's w.
+// bounces take some of their own in every direction that their paths begin with.
 fn lamp_words(index: u32, number: u32) -> vec4<u32> {
     var pixel = pixel_of(index);
     if (params.flags & PARAM_BOUNCE) != 0u {
-        pixel ^= pcg(u32(throughput[index].w) + 1u);
+        pixel ^= pcg(origins[index].direction + 1u);
     }
     return points4(pixel, params.stream, params.seed ^ (number * GOLDEN));
 }

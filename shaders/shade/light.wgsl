@@ -56,5 +56,5 @@ fn add_light(index: u32, light: vec3<f32>) {
         atomicAdd(&counters[COUNTER_NON_FINITE], 1u);
         return;
     }
-    radiance[index] += vec4<f32>(color, 0.0);
+    radiance[own_pixel(index)] += vec4<f32>(color, 0.0);
 }

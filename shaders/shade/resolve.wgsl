@@ -10,6 +10,8 @@
 
 // Of the angle between a ray and a normal; below it a footprint is that of this one.
 const LEAST_COSINE: f32 = 0.05;
+// As much as a ray of a hundred over the hemisphere stands for: the root of pi / 100.
+const WIDEST_BEND: f32 = 0.17724539;
 
 // The normal of an attribute vertex; zero if it has none.
 fn octahedral(word: u32) -> vec3<f32> {
@@ -35,22 +37,41 @@ fn rounded_dot(a: vec3<f32>, b: vec3<f32>) -> f32 {
     return barrier(barrier(barrier(a.x * b.x) + barrier(a.y * b.y)) + barrier(a.z * b.z));
 }
 
+// Of the surface that has such unit normals at the corners of a triangle of half this area: how much of the sphere of
+// directions the normals cover by how much of the surface (Gauss). Rotations do not change it.
+fn curvature_of(n: array<vec3<f32>, 3>, area: f32) -> f32 {
+    return length(cross(n[1] - n[0], n[2] - n[0])) / max(area, 1.0e-30);
+}
+
+// Tangent of the angle by which a reflection widens the cone of a camera ray that went so far, by the curvature of what
+// reflects it: cones.wgsl.
+fn bend(curvature: f32, way: f32) -> f32 {
+    if curvature == 0.0 {
+        return 0.0;
+    }
+    return min(barrier(barrier(way * params.step_y.w) * square_root(curvature)), WIDEST_BEND);
+}
+
 // What the pixel covers of the textures' unit square, an area, by ray cones (Akenine-Möller et al. 2021, "Improved
 // shader and texture level of detail using ray cones", eq. 2): the cone's width at the hit by the cosine there,
 // squared, times the area of the triangle in texture coordinates by that in the world. A cone is as wide as the part of
 // a pixel that its sample stands for, the pixel over the root of the number of samples, so that many samples show what
-// a larger picture does. Cones go on from hits without a change, so their width follows from the way from the camera.
-// Rounded as it stands: which tiles are read depends on it.
+// a larger picture does. Cones go on from hits as they are, so their width follows from the way from the camera, and
+// from the curvature of what reflects them (cones.wgsl). Rounded as it stands: which tiles are read depends on it.
 fn footprint_of(ray: Ray, t: f32, surface: Surface, uvs: array<vec2<f32>, 3>) -> f32 {
     let e1 = uvs[1] - uvs[0];
     let e2 = uvs[2] - uvs[0];
     let uv_area = abs(barrier(barrier(e1.x * e2.y) - barrier(e1.y * e2.x)));
     let way = ray.origin - params.origin.xyz;
     let length = square_root(rounded_dot(ray.direction, ray.direction));
-    let distance = barrier(square_root(rounded_dot(way, way)) + barrier(t * length));
+    let to_origin = square_root(rounded_dot(way, way));
+    let from_origin = barrier(t * length);
+    let distance = barrier(to_origin + from_origin);
     let cosine = max(divide(abs(rounded_dot(ray.direction, surface.normal)), length), LEAST_COSINE);
     let width = divide(barrier(distance * params.step_y.w), cosine);
-    return barrier(divide(uv_area, max(surface.area, 1.0e-30)) * barrier(width * width));
+    let spread = divide(barrier(bend(bitcast<f32>(surface.emitter), to_origin) * from_origin), cosine);
+    let square = barrier(barrier(width * width) + barrier(spread * spread));
+    return barrier(divide(uv_area, max(surface.area, 1.0e-30)) * square);
 }
 
 // One thread a pixel.
@@ -98,12 +119,14 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var uvs: array<vec2<f32>, 3>;
     var uv = vec2<f32>(0.0);
     var color = vec4<f32>(0.0);
+    var normals: array<vec3<f32>, 3>;
     for (var k = 0u; k < 3u; k++) {
         let v = cache_vec4(page, (at >> 2u) + corner[k]);
         var n = octahedral(v.x);
         if is_stretched {
             n = unit_or_zero(m[0].xyz * n.x + m[1].xyz * n.y + m[2].xyz * n.z);
         }
+        normals[k] = n;
         normal += weights[k] * n;
         uvs[k] = bitcast<vec2<f32>>(v.yz);
         // Rounded as it stands: which tiles are read depends on it.
@@ -141,6 +164,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     g.occlusion = 1.0;
     g.metallic = material.metallic;
     g.roughness = material.roughness;
+    g.curvature = curvature_of(normals, surface.area);
     for (var place = 0u; place < MATERIAL_TEXTURES; place++) {
         if texture_of(material, place) != NONE {
             g.state |= 1u << (GBUFFER_FIRST + place);

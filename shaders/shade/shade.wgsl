@@ -68,7 +68,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     }
     var density = 0.0;
     if (params.flags & PARAM_BOUNCE) != 0u {
-        density = densities[index];
+        density = throughput[index].w;
     } else {
         radiance[index].w += 1.0;
     }

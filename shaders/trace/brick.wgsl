@@ -119,5 +119,7 @@ fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>,
     if off > 0.0 {
         point = barrier3(point + barrier3(off * normal));
     }
-    surfaces[ray] = Surface(point, best.leaf, normal, best.triangle, area, best.source, surfaces[ray].pending, 0u);
+    let before = surfaces[ray];
+    surfaces[ray] =
+        Surface(point, best.leaf, normal, best.triangle, area, best.source, before.pending, before.emitter);
 }

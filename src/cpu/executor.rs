@@ -12,7 +12,7 @@ use crate::kernels::rays::RaySet;
 use crate::kernels::shade::more;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
-use crate::kernels::table::{self, Family, Target, names};
+use crate::kernels::table::{self, Family, Target};
 use crate::kernels::texture::texels::{Sampling, Texels, TileDemand};
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::intersect_binary::BinaryTrees;
@@ -73,6 +73,8 @@ pub struct CpuExecutor {
     extent: Extent,
     /// What of it this frame takes.
     rows: Extent,
+    /// The first rows of sets 1 and 2, in which the rays of paths that go on lie; until a pass begins others: all.
+    path_rows: Option<Extent>,
     view: Params,
     directions: Directions,
     tuning: Tuning,
@@ -113,6 +115,7 @@ impl CpuExecutor {
             binary: None,
             extent,
             rows: extent,
+            path_rows: None,
             view: Params::default(),
             directions: Directions::default(),
             tuning: Tuning::new(&setup),
@@ -124,9 +127,21 @@ impl CpuExecutor {
         })
     }
 
+    /// The rows that the rays of a pass lie in.
+    fn rows_of(&self, pass: Pass) -> Extent {
+        if pass.begins() { self.rows } else { self.path_rows.unwrap_or(self.rows) }
+    }
+
+    /// Has paths lie in so many rows.
+    fn set_path_rows(&mut self, rows: Option<Extent>) {
+        self.path_rows = rows;
+        let rays = rows.unwrap_or(self.rows).rays();
+        self.buffers.sets[1..].iter_mut().filter(|set| !set.rays.is_empty()).for_each(|set| set.resize(rays));
+        self.buffers.pixels.resize_bounces(rays);
+    }
+
     /// The parameters of all dispatches of a submission.
-    fn params(&self) -> Params {
-        let extent = self.rows;
+    fn params(&self, extent: Extent) -> Params {
         Params {
             zero: 0,
             width: extent.width,
@@ -189,7 +204,7 @@ fn run_kernel(
     let Buffers { sets, pixels, tiles, families } = buffers;
     // The set of the pass, and the one before it, whose hits are shaded.
     let (before, from) = sets.split_at_mut(pass.set());
-    let none = RaySet::default();
+    let mut none = RaySet::default();
     let family = families.iter_mut().find_map(|own| Some((own.family.kernel(dispatch.kernel)?, &mut own.words[..])));
     let (kernel, buffers) = match (table::kernel(dispatch.kernel), family) {
         (Some(kernel), _) => (kernel, &mut [][..]),
@@ -203,7 +218,7 @@ fn run_kernel(
     };
     let mut target = Target {
         own: &mut from[0],
-        seen: before.last().unwrap_or(&none),
+        seen: before.last_mut().unwrap_or(&mut none),
         shaded: pass.set().saturating_sub(1),
         pixels,
         tiles,
@@ -246,7 +261,12 @@ impl Executor for CpuExecutor {
     }
 
     fn run(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
-        let params = self.params();
+        if self.path_rows.is_some() && pass.begins() && pass.set() == 1 {
+            self.set_path_rows(None);
+        }
+        let rows = self.rows_of(pass);
+        self.buffers.tiles.resize(rows.tiles() as usize);
+        let params = self.params(rows);
         let resident = self.file.resident();
         let needs_all = steps.iter().any(|step| matches!(step, Step::IntersectAll | Step::IntersectBinary));
         let geometry = self.cache.geometry(resident, bricks, needs_all, &self.opacity)?;
@@ -283,13 +303,6 @@ impl Executor for CpuExecutor {
                 };
                 let binary = self.binary.as_ref();
                 run_kernel(&dispatch, pass, &bound, &mut self.buffers, &attributes, (sampling, &tile_demand), binary)?;
-                if dispatch.kernel == names::generate_path {
-                    // What it has made belongs to the set before.
-                    let [_, seen, own] = &mut self.buffers.sets;
-                    seen.rays.clone_from(&own.rays);
-                    seen.hits.clone_from(&own.hits);
-                    seen.surfaces.clone_from(&own.surfaces);
-                }
                 if let Some(phase) = dispatch.phase {
                     ms_phases[phase] += start.elapsed().as_secs_f64() * 1e3;
                 }
@@ -305,6 +318,9 @@ impl Executor for CpuExecutor {
         }
         if steps.contains(&Step::QueryStandIns) {
             report.states = stand_ins::states(&self.buffers.sets[pass.set()]);
+        }
+        if steps.contains(&Step::MovePaths { compact: true }) {
+            self.set_path_rows(Some(rows.first(Some(report.paths as usize))));
         }
         Ok(report)
     }
@@ -333,7 +349,7 @@ impl FrameExecutor for CpuExecutor {
 
     fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError> {
         let has_bounces = !self.buffers.sets[2].rays.is_empty();
-        (self.extent, self.rows) = (extent, extent);
+        (self.extent, self.rows, self.path_rows) = (extent, extent, None);
         self.buffers.sets = [extent.rays(), extent.rays(), 0].map(RaySet::new);
         let has_more = !self.buffers.pixels.mores[0].is_empty();
         self.buffers.pixels = Pixels::new(extent.rays(), has_more);
@@ -407,16 +423,15 @@ impl FrameExecutor for CpuExecutor {
         self.view = view.params;
         self.directions = view.directions;
         let rows = self.extent.first(view.rays);
-        if rows != self.rows {
-            self.rows = rows;
+        if rows != self.rows || self.path_rows.is_some() {
+            (self.rows, self.path_rows) = (rows, None);
             self.buffers.sets.iter_mut().filter(|set| !set.rays.is_empty()).for_each(|set| set.resize(rows.rays()));
             self.buffers.pixels.resize(rows.rays());
-            self.buffers.tiles = TileLists::new(rows.tiles() as usize);
         }
     }
 
     fn set_rays(&mut self, pass: Pass, rays: &[layout::Ray]) {
-        self.buffers.sets[pass.set()].rays = padded(rays, self.rows.rays());
+        self.buffers.sets[pass.set()].rays = padded(rays, self.rows_of(pass).rays());
     }
 
     fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {

@@ -106,6 +106,16 @@ impl Engine {
         self.settings.half_rate && self.settings.samples == 1 && self.settings.aov
     }
 
+    /// Whether the rays of paths that go on come together. They keep their places where something is known of these
+    /// from pass to pass.
+    pub fn compacts(&self) -> bool {
+        #[cfg(feature = "lab")]
+        if self.fronts.is_some() {
+            return false;
+        }
+        self.budgeted.is_none() && self.captures.is_none() && !self.halves()
+    }
+
     /// Rays that are traced at a time.
     pub fn rays(&self) -> usize {
         self.size.0 as usize * self.band_rows as usize

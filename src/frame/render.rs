@@ -367,7 +367,8 @@ fn bounces(
         let mut rays = 0;
         records.pass(engine, names[0], |r, stats| {
             let from = if is_lit { Pass::PathShadow } else { Pass::BounceShadow };
-            stats.add(r.executor.run(from(Lamp::Sun), &[Step::Continue(number)], &r.cache.states)?);
+            let steps = [Step::Continue(number), Step::MovePaths { compact: r.compacts() }];
+            stats.add(r.executor.run(from(Lamp::Sun), &steps, &r.cache.states)?);
             let before = stats.rays_traced;
             r.trace(frame, Pass::Path(number), [&[], &[]], stats)?;
             rays = stats.rays_traced - before;

@@ -53,6 +53,8 @@ pub struct GpuExecutor {
     extent: Extent,
     /// What of it this frame takes.
     rows: Extent,
+    /// The first rows of sets 1 and 2, in which the rays of paths that go on lie; until a pass begins others: all.
+    path_rows: Option<Extent>,
     /// Of every submission.
     readback: Readback,
     /// Of whole buffers.
@@ -119,7 +121,7 @@ impl GpuExecutor {
             texels: Texels::new(&gpu, &scene, setup.keep.textures)?,
             lamps: LampBuffers::new(&gpu, kernels.pages),
             sets: [extent.rays(), extent.rays(), 0].map(|rays| RayBuffers::new(&gpu, rays)),
-            pixels: PixelBuffers::new(&gpu, (extent.rays(), 0), more::is_needed(scene.resident())),
+            pixels: PixelBuffers::new(&gpu, extent, false, more::is_needed(scene.resident())),
             tiles: TileBuffers::new(&gpu, extent, extent.tiles().saturating_mul(LIST_ENTRIES_PER_TILE)),
             demand: storage(&gpu, "demand", bricks, size_of::<layout::Demand>()),
             counters: storage(&gpu, "counters", layout::COUNTERS_AND_WORK, 4),
@@ -145,6 +147,7 @@ impl GpuExecutor {
             unheld: None,
             extent,
             rows: extent,
+            path_rows: None,
             readback,
             whole,
             timing,
@@ -179,16 +182,27 @@ impl GpuExecutor {
 
     /// The G-buffer of a set, without the half that keeps further textures.
     fn gbuffer_of(&mut self, set: usize) -> Result<Vec<layout::GBuffer>, ExecutorError> {
-        self.whole.first(&self.gpu, &self.buffers.pixels.gbuffers[set], self.rows.rays())
+        let rays = self.rays_of(set);
+        self.whole.first(&self.gpu, &self.buffers.pixels.gbuffers[set], rays)
     }
 
     fn rebind(&mut self) {
         self.groups = Groups::new(&self.gpu, &self.kernels, &self.buffers);
     }
 
+    /// Rays of set 0 or 1 whose hits are shaded.
+    fn rays_of(&self, set: usize) -> usize {
+        let rows = if set == 0 { self.rows } else { self.path_rows.unwrap_or(self.rows) };
+        rows.rays()
+    }
+
+    /// The rows that the rays of a pass lie in.
+    fn rows_of(&self, pass: Pass) -> Extent {
+        if pass.begins() { self.rows } else { self.path_rows.unwrap_or(self.rows) }
+    }
+
     /// The parameters of all dispatches of a submission.
-    fn params(&self) -> Params {
-        let extent = self.rows;
+    fn params(&self, extent: Extent) -> Params {
         Params {
             zero: 0,
             width: extent.width,
@@ -209,7 +223,11 @@ impl GpuExecutor {
     /// One submission: all steps, then counters and demand read back.
     fn submit(&mut self, pass: Pass, steps: &[Step], bricks: &BrickStates) -> Result<Report, ExecutorError> {
         self.gpu.queue.write_buffer(&self.buffers.scene.slots, 0, bytemuck::cast_slice(&report::slots(bricks)));
-        let params = self.params();
+        if pass.begins() && pass.set() == 1 {
+            self.path_rows = None;
+        }
+        let rows = self.rows_of(pass);
+        let params = self.params(rows);
         let everything = bricks.all_geometry_resident();
         let samples = steps.iter().any(|step| step.is_sampling()) && self.groups.sampling.is_some();
         if samples {
@@ -227,9 +245,9 @@ impl GpuExecutor {
         }
         let dispatches = list;
         if dispatches.iter().any(|dispatch| dispatch.kernel == names::count_pairs) {
-            self.make_room_for_counts()?;
+            self.make_room_for_counts(rows)?;
         }
-        let rays = self.rows.rays();
+        let rays = rows.rays();
         let asks_for_stand_ins = dispatches.iter().any(|dispatch| dispatch.kernel == names::query_stand_ins);
         if asks_for_stand_ins {
             self.make_room_for_pair_rays(rays as u64);
@@ -304,14 +322,6 @@ impl GpuExecutor {
                     compute.dispatch_workgroups_indirect(&self.buffers.indirect, 0);
                 }
             }
-            drop(compute);
-            if dispatch.kernel == names::generate_path {
-                // What it has made belongs to the set before.
-                let [_, seen, own] = &self.buffers.sets;
-                for (own, seen) in own.buffers().into_iter().zip(seen.buffers()) {
-                    encoder.copy_buffer_to_buffer(own, 0, seen, 0, own.size().min(seen.size()));
-                }
-            }
         }
         self.timing.resolve(&mut encoder, dispatches.len() as u32);
         let mut read = vec![&self.buffers.counters, &self.buffers.demand];
@@ -336,6 +346,9 @@ impl GpuExecutor {
             let rays: Vec<u32> = self.whole.read(&self.gpu, &self.buffers.tiles.pair_rays)?;
             report.pair_rays = rays[..self.pair_nodes as usize].to_vec();
         }
+        if steps.contains(&Step::MovePaths { compact: true }) {
+            self.path_rows = Some(rows.first(Some(report.paths as usize)));
+        }
         if asks_for_stand_ins {
             let states: Vec<u32> = self.whole.read(&self.gpu, &self.buffers.tiles.pair_rays)?;
             report.states = states[..rays].to_vec();
@@ -351,8 +364,8 @@ impl GpuExecutor {
     }
 
     /// Makes room for the counts of how many rays of each tile see each leaf.
-    fn make_room_for_counts(&mut self) -> Result<(), ExecutorError> {
-        let (tiles, leaves) = (self.rows.tiles(), self.scene.resident().leaves.len());
+    fn make_room_for_counts(&mut self, rows: Extent) -> Result<(), ExecutorError> {
+        let (tiles, leaves) = (rows.tiles(), self.scene.resident().leaves.len());
         let pairs = u64::from(tiles) * leaves as u64;
         if 4 * pairs > self.gpu.limits.max_storage_buffer_binding_size {
             return Err(report::too_many_pairs(tiles, leaves));
@@ -399,9 +412,9 @@ impl FrameExecutor for GpuExecutor {
         check_extent(&self.gpu, extent)?;
         let rays = extent.rays();
         let bounces = if self.has_bounces { rays } else { 0 };
-        (self.extent, self.rows) = (extent, extent);
+        (self.extent, self.rows, self.path_rows) = (extent, extent, None);
         self.buffers.sets = [rays, rays, bounces].map(|rays| RayBuffers::new(&self.gpu, rays));
-        self.buffers.pixels = PixelBuffers::new(&self.gpu, (rays, bounces), self.has_more());
+        self.buffers.pixels = PixelBuffers::new(&self.gpu, extent, self.has_bounces, self.has_more());
         self.buffers.tiles = TileBuffers::new(&self.gpu, extent, self.buffers.tiles.capacity);
         self.rebind();
         Ok(())
@@ -411,7 +424,7 @@ impl FrameExecutor for GpuExecutor {
         self.has_bounces = true;
         let rays = self.extent.rays();
         self.buffers.sets[2] = RayBuffers::new(&self.gpu, rays);
-        self.buffers.pixels = PixelBuffers::new(&self.gpu, (rays, rays), self.has_more());
+        self.buffers.pixels = PixelBuffers::new(&self.gpu, self.extent, true, self.has_more());
         self.rebind();
     }
 
@@ -508,24 +521,24 @@ impl FrameExecutor for GpuExecutor {
         self.buffers.lamps.rebase(&self.gpu, view.frame);
         self.view = view.params;
         self.directions = view.directions;
-        self.rows = self.extent.first(view.rays);
+        (self.rows, self.path_rows) = (self.extent.first(view.rays), None);
     }
 
     fn set_rays(&mut self, pass: Pass, rays: &[layout::Ray]) {
-        let all = padded(rays, self.rows.rays());
+        let all = padded(rays, self.rows_of(pass).rays());
         self.gpu.queue.write_buffer(&self.buffers.sets[pass.set()].rays, 0, bytemuck::cast_slice(&all));
     }
 
     fn read_rays(&mut self, pass: Pass) -> Result<Vec<layout::Ray>, ExecutorError> {
-        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].rays, self.rows.rays())
+        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].rays, self.rows_of(pass).rays())
     }
 
     fn read_hits(&mut self, pass: Pass) -> Result<Vec<layout::Hit>, ExecutorError> {
-        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].hits, self.rows.rays())
+        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].hits, self.rows_of(pass).rays())
     }
 
     fn read_surfaces(&mut self, pass: Pass) -> Result<Vec<layout::Surface>, ExecutorError> {
-        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].surfaces, self.rows.rays())
+        self.whole.first(&self.gpu, &self.buffers.sets[pass.set()].surfaces, self.rows_of(pass).rays())
     }
 
     fn read_gbuffer(&mut self) -> Result<Vec<layout::GBuffer>, ExecutorError> {

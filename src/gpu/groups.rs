@@ -93,7 +93,7 @@ impl Groups {
         let shading = |set: usize| {
             let RayBuffers { rays, hits, surfaces } = &sets[set];
             let (gbuffer, radiance) = (&pixels.gbuffers[set], &pixels.radiance);
-            let of_bounces = [&pixels.throughput, &pixels.densities];
+            let of_bounces = [&pixels.throughput, &pixels.origins];
             let buffers = [&texels.materials, gbuffer, radiance, rays, hits, surfaces].into_iter().chain(of_bounces);
             group("shading", &kernels.shading, &numbered(buffers, 0))
         };

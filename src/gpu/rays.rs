@@ -48,10 +48,10 @@ pub struct PixelBuffers {
     pub gbuffers: [wgpu::Buffer; 2],
     /// Radiance summed over the samples of a batch.
     pub radiance: wgpu::Buffer,
-    /// Share of the light that the rays of set 1 bring.
+    /// Share of the light that the rays of set 1 bring, and by which density their directions were drawn.
     pub throughput: wgpu::Buffer,
-    /// By which their directions were drawn.
-    pub densities: wgpu::Buffer,
+    /// [`layout::Origin`]s of the rays of set 1, and behind them the counts of blocks (`shaders/paths/alive.wgsl`).
+    pub origins: wgpu::Buffer,
 }
 
 /// A storage buffer of `count` elements that can be written from and copied to the host.
@@ -71,11 +71,6 @@ impl RayBuffers {
             hits: storage(gpu, "hits", rays, size_of::<layout::Hit>()),
             surfaces: storage(gpu, "surfaces", rays, size_of::<layout::Surface>()),
         }
-    }
-
-    /// All of them.
-    pub fn buffers(&self) -> [&wgpu::Buffer; 3] {
-        [&self.rays, &self.hits, &self.surfaces]
     }
 }
 
@@ -111,16 +106,20 @@ impl TileBuffers {
 }
 
 impl PixelBuffers {
-    /// For `rays` pixels, of which `bounces` have rays in set 1 whose hits are shaded; `has_more`: of a scene with
-    /// further textures.
-    pub fn new(gpu: &Gpu, (rays, bounces): (usize, usize), has_more: bool) -> Self {
+    /// For the pixels of `extent`; `has_bounces`: they have rays in set 1 whose hits are shaded; `has_more`: of a scene
+    /// with further textures.
+    pub fn new(gpu: &Gpu, extent: Extent, has_bounces: bool, has_more: bool) -> Self {
+        let rays = extent.rays();
+        let bounces = if has_bounces { rays } else { 0 };
+        // One a block of 8 x 8, and their sum.
+        let counts = extent.tiles() as usize * (extent.tile as usize / 8).pow(2) + 1;
         let halves = if has_more { 2 } else { 1 };
         let gbuffer = |count| storage(gpu, "gbuffer", halves * count, size_of::<layout::GBuffer>());
         Self {
             gbuffers: [gbuffer(rays), gbuffer(bounces)],
             radiance: storage(gpu, "radiance", rays, 16),
             throughput: storage(gpu, "throughput", bounces, 16),
-            densities: storage(gpu, "densities", bounces, 4),
+            origins: storage(gpu, "origins", bounces + counts, size_of::<layout::Origin>()),
         }
     }
 }

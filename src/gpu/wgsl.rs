@@ -168,7 +168,7 @@ fn tile_spreads() -> u32 {
 
 /// What stands for `shade/cones.wgsl` there.
 const NO_CONES: &str = "\
-fn widen_reflected(ray: u32, density: f32, alpha: f32) {}
+fn widen_reflected(ray: u32, density: f32, alpha: f32, curvature: f32) {}
 ";
 
 /// What stands for `shade/gloss.wgsl` where all surfaces are Lambertian.

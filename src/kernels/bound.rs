@@ -4,7 +4,7 @@
 use super::frame::{Frame, Placement};
 use super::lamps::LampTables;
 use super::layout;
-use super::layout::Params;
+use super::layout::{Origin, PARAM_BOUNCE, Params};
 use super::levels::LevelTable;
 use super::payloads::BrickView;
 use super::simd::isa::Best;
@@ -77,6 +77,13 @@ pub struct Demand {
     pub nearest: AtomicU32,
     /// How many enter it before any other brick that they ask for; of a pair, none.
     pub next: AtomicU32,
+}
+
+/// Words that several threads write.
+pub fn atomic(words: &mut [u32]) -> &[AtomicU32] {
+    // SAFETY: an AtomicU32 has the size and alignment of a u32, every bit pattern of either is one of the other, and
+    // the exclusive borrow leaves no other way to the words while the result lives.
+    unsafe { &*(std::ptr::from_mut(words) as *const [AtomicU32]) }
 }
 
 /// Bits of the distance at which a ray enters, ordered as distances are.
@@ -188,11 +195,16 @@ impl<'a> Bound<'a> {
         self.params.flags & flag != 0
     }
 
-    /// The pixel of the picture that a ray belongs to: random numbers are drawn by it, not by the ray's place in a
-    /// band.
+    /// The pixel of the band that a hit of the shaded set belongs to.
     #[inline(always)]
-    pub fn pixel_of(&self, index: usize) -> u32 {
-        self.params.first_row.wrapping_mul(self.params.width).wrapping_add(index as u32)
+    pub fn own_pixel(&self, index: usize, origins: &[Origin]) -> u32 {
+        if self.has(PARAM_BOUNCE) { origins[index].pixel } else { index as u32 }
+    }
+
+    /// That of the picture: random numbers are drawn by it, not by a ray's place in a band or in its set.
+    #[inline(always)]
+    pub fn pixel_of(&self, index: usize, origins: &[Origin]) -> u32 {
+        self.params.first_row.wrapping_mul(self.params.width).wrapping_add(self.own_pixel(index, origins))
     }
 
     /// What a method's kernel is told, as its WGSL declares it.

@@ -169,6 +169,12 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
             let stream = params.sample.wrapping_add(FIRST_STREAM_OF_PATHS.wrapping_add(number) << 24);
             vec![shading(kernels::generate_path, Params { stream, direction: number, ..params })]
         }
+        Step::MovePaths { compact: false } => vec![kernel(kernels::keep_paths, params, by_tile, None)],
+        Step::MovePaths { compact: true } => vec![
+            kernel(kernels::count_paths, params, by_tile, None),
+            kernel(kernels::scan_paths, params, [1, 1], None),
+            kernel(kernels::compact_paths, params, by_tile, None),
+        ],
         Step::StartHits => vec![kernel(kernels::start_hits, params, per_ray, None)],
         Step::ClipRays => vec![kernel(kernels::clip_rays, params, per_ray, None)],
         Step::HalveRays => vec![kernel(kernels::halve_rays, params, per_ray, None)],

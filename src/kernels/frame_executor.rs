@@ -52,8 +52,8 @@ pub trait FrameExecutor: Executor {
     /// More rays than the device holds.
     fn set_extent(&mut self, extent: Extent) -> Result<(), ExecutorError>;
 
-    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Glossy`] and [`Pass::BounceShadow`], 160
-    /// bytes a pixel; without it they must not be run.
+    /// Makes room for the passes [`Pass::Diffuse`], [`Pass::Glossy`], [`Pass::Path`] and those from their hits: a set
+    /// of rays more, and what shading keeps of its hits. Without it they must not be run.
     fn allow_bounces(&mut self);
 
     /// Hides triangles from all rays from now on. `bounds`: global ids, ascending, at which hiding begins and ends in

@@ -5,8 +5,8 @@
 //!
 //! Modules know those before them: plain structures ([`vector`], [`layout`], [`frame`], [`lamps`], [`payloads`] …);
 //! what every twin is given ([`bound`], [`rays`], [`tiles`]); the families [`trace`], [`query`], [`texture`],
-//! [`shade`]; the [`table`], [`noise`] and [`denoise`]; [`dispatch`]. [`simd`] lies below `bound`, and knows of the
-//! families the node test alone ([`trace::node`]).
+//! [`shade`] and [`paths`]; the [`table`], [`noise`] and [`denoise`]; [`dispatch`]. [`simd`] lies below `bound`, and
+//! knows of the families the node test alone ([`trace::node`]).
 
 pub mod bound;
 pub mod denoise;
@@ -21,6 +21,7 @@ pub mod layout;
 pub mod levels;
 pub mod noise;
 pub mod opacity;
+pub mod paths;
 pub mod payloads;
 pub mod query;
 pub mod rays;

@@ -74,6 +74,7 @@ pub fn of_counters(counters: &[u32], demand: &[layout::Demand]) -> Result<Report
         own: std::array::from_fn(|i| count(layout::COUNTER_PILOTS + i as u32)),
         demand: wanted.map(asked).collect(),
         list_entries: counters[layout::COUNTER_LIST_ENTRIES as usize],
+        paths: counters[layout::COUNTER_PATHS as usize],
         most_selected: counters[layout::COUNTER_MOST_SELECTED as usize],
         ..Report::default()
     })

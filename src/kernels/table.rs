@@ -6,6 +6,8 @@
 //! file. The kernels of a secondary method have a table of their own in the method's folder ([`Family`]).
 
 use super::bound::Bound;
+use super::paths::generate_path::generate_path;
+use super::paths::move_paths::{compact_paths, keep_paths};
 use super::payloads::AttributeView;
 use super::query::query::query;
 use super::query::query_all::{count_pairs, query_all};
@@ -20,7 +22,6 @@ use super::shade::generate::{
     generate_diffuse, generate_glossy, generate_occlusion, generate_primary, generate_shadow, start_hits,
 };
 use super::shade::halve_rays::halve_rays;
-use super::shade::paths::generate_path;
 use super::shade::resolve::resolve;
 use super::shade::shade::{Pixels, add_light, add_occlusion, clear_gbuffer, hit_demand, shade};
 use super::texture::sample::sample;
@@ -32,7 +33,6 @@ use super::trace::intersect_list::intersect_list;
 use super::trace::run::Work;
 use crate::schedule::ExecutorError;
 use bricks::Material;
-use std::sync::atomic::AtomicU32;
 
 /// Which groups a kernel binds beside 0, the scene, and 1, parameters and rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -58,7 +58,7 @@ pub struct Target<'a> {
     /// The set of the pass.
     pub own: &'a mut RaySet,
     /// The set before it, whose hits are shaded; of set 0 nothing.
-    pub seen: &'a RaySet,
+    pub seen: &'a mut RaySet,
     /// Its number.
     pub shaded: usize,
     /// What shading keeps per pixel.
@@ -87,13 +87,6 @@ pub fn words<const N: usize>(buffers: &mut [Vec<u32>]) -> Result<[&mut [u32]; N]
     <&mut [Vec<u32>; N]>::try_from(buffers)
         .map(|all| all.each_mut().map(Vec::as_mut_slice))
         .map_err(|_| ExecutorError::Device("has other buffers than the kernel; this is a bug in brickwalk".into()))
-}
-
-/// Words that several threads write.
-pub fn atomic(words: &mut [u32]) -> &[AtomicU32] {
-    // SAFETY: an AtomicU32 has the size and alignment of a u32, every bit pattern of either is one of the other, and
-    // the exclusive borrow leaves no other way to the words while the result lives.
-    unsafe { &*(std::ptr::from_mut(words) as *const [AtomicU32]) }
 }
 
 /// The twin of a kernel.
@@ -201,15 +194,19 @@ kernels! {
 
     generate_primary: "shade/generate_primary" Tiles [] |b, t| generate_primary(b, t.own);
     generate_shadow: "shade/generate_shadow" Shading []
-        |b, t| generate_shadow(b, t.own, t.seen, &t.pixels.throughput);
+        |b, t| generate_shadow(b, t.own, t.seen, &t.pixels.origins);
     generate_occlusion: "shade/generate_around" Shading [LIMITED = 1]
         |b, t| generate_occlusion(b, t.own, t.seen, &t.pixels.gbuffers[t.shaded]);
     generate_diffuse: "shade/generate_around" Shading [LIMITED = 0]
         |b, t| generate_diffuse(b, t.own, t.seen, t.pixels, t.materials);
     generate_glossy: "shade/generate_glossy" Shading []
         |b, t| generate_glossy(b, t.own, t.seen, t.pixels, t.materials);
-    generate_path: "shade/generate_path" Shading []
+    generate_path: "paths/generate_path" Shading []
         |b, t| generate_path(b, t.own, t.seen, t.pixels, t.materials);
+    count_paths: "paths/count_paths" Shading [] |_, _| ();
+    scan_paths: "paths/scan_paths" Shading [] |_, _| ();
+    keep_paths: "paths/move_paths" Shading [COMPACT = 0] |b, t| keep_paths(b, t.own, t.seen, t.pixels);
+    compact_paths: "paths/move_paths" Shading [COMPACT = 1] |b, t| compact_paths(b, t.own, t.seen, t.pixels);
     start_hits: "shade/start_hits" Tiles [] |_, t| start_hits(t.own);
     clip_rays: "shade/clip_rays" Tiles [] |b, t| clip_rays(b, t.own);
     halve_rays: "shade/halve_rays" Tiles [] |b, t| halve_rays(b, t.own);

@@ -45,6 +45,16 @@ impl TileLists {
         Self { bounds, lists, chosen: vec![false; tiles], nearest: vec![0.0; tiles], ..Self::default() }
     }
 
+    /// For so many tiles from now on.
+    pub fn resize(&mut self, tiles: usize) {
+        if self.lists.len() != tiles {
+            self.bounds.resize(tiles, TileBounds::default());
+            self.lists.resize(tiles, TileList::default());
+            self.chosen.resize(tiles, false);
+            self.nearest.resize(tiles, 0.0);
+        }
+    }
+
     /// Makes room for so many entries.
     ///
     /// # Errors

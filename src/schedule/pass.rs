@@ -44,6 +44,11 @@ impl Pass {
         }
     }
 
+    /// Whether its rays start a chain: paths that came together before it have their places no more.
+    pub fn begins(self) -> bool {
+        self.set() < 2 && !matches!(self, Pass::Path(_))
+    }
+
     /// Whether any hit ends a ray.
     pub fn is_any_hit(self) -> bool {
         matches!(self, Pass::Shadow(_) | Pass::Occlusion(_) | Pass::BounceShadow(_) | Pass::PathShadow(_))

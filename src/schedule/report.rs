@@ -50,6 +50,8 @@ pub struct Report {
     pub list_entries: u32,
     /// Most leaves that a tile selected to be intersected.
     pub most_selected: u32,
+    /// Paths that go on, after [`Step::MovePaths`](super::Step::MovePaths) that has them come together.
+    pub paths: u32,
     /// What kernels of a method counted for it, from its first counter on.
     pub own: [u64; OWN_COUNTERS],
     /// After [`Step::QueryStandIns`](super::Step::QueryStandIns) for each ray 0 where it has the hit that it has with

@@ -5,9 +5,14 @@
 pub enum Step {
     /// Fill the pass's rays from the camera, or from the hits of the set before.
     Generate,
-    /// Fill the rays of set 1 by which paths go on from its hits, each path's of this number; run as a pass of set 2.
+    /// Make the rays by which paths go on from the hits of set 1, each path's of this number; run as a pass of set 2.
     /// As one of [`Pass::BounceShadow`](super::Pass), by facets that refract alone.
     Continue(u32),
+    /// Move them to set 1, as the rays of [`Pass::Path`](super::Pass).
+    MovePaths {
+        /// Whether those that go on come together in the first rows; else each keeps its place.
+        compact: bool,
+    },
     /// Start the hits of rays given from outside.
     StartHits,
     /// Leave of the rays what lies on this side of the plane that the scene is cut at.

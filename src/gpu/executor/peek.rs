@@ -23,13 +23,18 @@ impl GpuExecutor {
         self.gbuffer_of(set)
     }
 
+    /// Whether further textures are kept of a hit.
+    pub fn keeps_more(&self, hit: &layout::GBuffer) -> bool {
+        hit.state != 0 && self.scene.resident().materials[hit.material as usize].flags & layout::MATERIAL_MORE != 0
+    }
+
     /// What further textures of the hits of a set show; empty in scenes without.
     pub fn read_more_of(&mut self, set: usize) -> Result<Vec<layout::More>, ExecutorError> {
         if !self.has_more() {
             return Ok(Vec::new());
         }
         let all: Vec<layout::GBuffer> = self.whole.read(&self.gpu, &self.buffers.pixels.gbuffers[set])?;
-        Ok(all[all.len() / 2..].iter().map(kept).collect())
+        Ok(all[all.len() / 2..].iter().take(self.rays_of(set)).map(kept).collect())
     }
 }
 

@@ -103,8 +103,8 @@ fn a_pipeline_that_differs_is_named() {
         // The same hits, but rays that start elsewhere: brute force does not tell.
         (
             list,
-            "surfaces[ray] = Surface(point,",
-            "surfaces[ray] = Surface(point + point * 0x1p-22,",
+            "Surface(point, best.leaf,",
+            "Surface(point + point * 0x1p-22, best.leaf,",
             vec![format!("{list}{closest}{all}"), format!("{list}{any}{all}")],
         ),
     ];

@@ -5,7 +5,7 @@ use super::lamps::{drawn_light, environment_sample, lamp_words, unit};
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_DISTANT_GROUP, EMITTER_GROUP, EMITTER_KIND, EMITTER_PARALLELOGRAM, EMITTER_TRIANGLE,
-    EMITTER_TWO_SIDED, Emitter, NONE,
+    EMITTER_TWO_SIDED, Emitter, NONE, Origin,
 };
 use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most};
 use crate::math::exact::{divide, square_root};
@@ -123,10 +123,10 @@ pub fn choose_emitter(emitters: &[Emitter], count: u32, random: u32, p: Vec3, n:
 
 /// One of a few directions to the environment, by its light and the cosine at a surface that is turned to n; see the
 /// kernel.
-pub fn choose_direction(bound: &Bound, index: usize, throughput: &[[f32; 4]], n: Vec3) -> Chosen {
+pub fn choose_direction(bound: &Bound, index: usize, origins: &[Origin], n: Vec3) -> Chosen {
     let (mut number, mut weight, mut sum) = (0, 0.0, 0.0);
     for k in 0..CANDIDATES {
-        let words = lamp_words(bound, index, k, throughput);
+        let words = lamp_words(bound, index, k, origins);
         let drawn = environment_sample(bound, words);
         let cosine = dot(n, drawn.direction);
         // What lies behind is not looked up.

@@ -2,7 +2,7 @@
 
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::Surface;
-use crate::kernels::vector::least;
+use crate::kernels::vector::{Vec3, dot, each, least};
 use std::f32::consts::PI;
 
 /// One of so many rays stands for its share of what is around.
@@ -14,11 +14,15 @@ pub const WIDEST: f32 = PI / RAYS_AROUND;
 /// What no square exceeds whatever the tolerance: [`Surface::pending`] has room for no more.
 const MOST_SPREAD: f32 = 1.0;
 
-/// Has the cone of a ray that was just started spread by an angle, given squared.
-pub fn widen(bound: &Bound, surface: &mut Surface, square: f32) {
+/// Has the cone of a ray that was just started from a surface of such a curvature spread by an angle, given squared,
+/// and by the curvature; see the kernel.
+pub fn widen(bound: &Bound, surface: &mut Surface, origin: Vec3, square: f32, curvature: f32) {
     if bound.has_levels() {
-        let square = least(bound.params.levels[2] * least(square, WIDEST), MOST_SPREAD);
-        surface.pending |= square.to_bits() << 1;
+        let [at_origin, _, tolerance, _] = bound.params.levels;
+        let way = each(|k| origin[k] - bound.params.origin[k]);
+        let of_curve = at_origin * dot(way, way) * curvature;
+        let square = least(tolerance * square + of_curve, tolerance * WIDEST);
+        surface.pending |= least(square, MOST_SPREAD).to_bits() << 1;
     }
 }
 

@@ -10,7 +10,7 @@ use super::random::{disc_point, tangent};
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
-    EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, PARAM_EMITTER, PARAM_ENVIRONMENT,
+    EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, Origin, PARAM_EMITTER, PARAM_ENVIRONMENT,
     PARAM_SCATTER, Params, Ray, Surface, T_INFINITE, UNSHARED,
 };
 use crate::kernels::rays::{RaySet, start_hit};
@@ -107,7 +107,7 @@ fn toward(e: &Emitter, start: Vec3, r: [f32; 2]) -> Vec3 {
 }
 
 /// One ray from every hit of the shaded set to a point of the pass's lamp; from surfaces that face away, none.
-pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughput: &[[f32; 4]]) {
+pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, origins: &[Origin]) {
     let p = bound.params;
     let sun = xyz(p.sun);
     for_each_new(own, |index| {
@@ -115,12 +115,12 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
         let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
         let mut chosen = Chosen::default();
         if surface.leaf != NONE {
-            let r = points2(bound.pixel_of(index), p.stream, p.seed);
+            let r = points2(bound.pixel_of(index, origins), p.stream, p.seed);
             let mut faces = true;
             let mut t_max = T_INFINITE;
             if bound.has(PARAM_EMITTER) {
                 // The first two words draw the point.
-                let random = lamp_words(bound, index, 0, throughput)[2];
+                let random = lamp_words(bound, index, 0, origins)[2];
                 let emitters = bound.lamps.emitters();
                 chosen = choose_emitter(emitters, p.emitter_count, random, surface.point, surface.normal);
                 faces = chosen.emitter != NONE;
@@ -131,8 +131,8 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
                     t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
                 }
             } else if bound.has(PARAM_ENVIRONMENT) {
-                chosen = choose_direction(bound, index, throughput, surface.normal);
-                let words = lamp_words(bound, index, chosen.emitter, throughput);
+                chosen = choose_direction(bound, index, origins, surface.normal);
+                let words = lamp_words(bound, index, chosen.emitter, origins);
                 ray.direction = environment_sample(bound, words).direction;
                 faces = chosen.probability > 0.0;
             } else if p.sun_radius > 0.0 {
@@ -155,7 +155,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, throughpu
 fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
     let p = bound.params;
     let mut a = p.around;
-    let r = points2(bound.pixel_of(index), p.stream, p.seed);
+    let r = points2(bound.pixel_of(index, &[]), p.stream, p.seed);
     let angle = a[3] * r[0];
     let (c, s) = (angle.cos(), angle.sin());
     let x = tangent(normal);
@@ -179,7 +179,7 @@ pub fn leaving(surface: &Surface, direction: Vec3, t_max: f32) -> Ray {
 }
 
 /// What stands for the ray of a pixel without a hit.
-pub(super) fn none(origin: Vec3) -> Ray {
+pub fn none(origin: Vec3) -> Ray {
     Ray { origin, t_min: 1.0, direction: [0.0, 1.0, 0.0], t_max: 0.0 }
 }
 
@@ -201,18 +201,18 @@ pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffe
 }
 
 /// As [`generate_occlusion`], of unlimited length. The throughput is noted: what of light from around the surface
-/// reflects, by the share of the direction; in w the direction's number.
+/// reflects, by the share of the direction; in w the density of the direction.
 pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
-    let Pixels { gbuffers: [gbuffer, _], mores: [mores, _], throughput, densities, .. } = pixels;
+    let Pixels { gbuffers: [gbuffer, _], mores: [mores, _], throughput, origins, .. } = pixels;
     for_each_leaving(own, seen, |index, surface| {
         leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
     });
-    let number = bound.params.direction as f32;
-    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut());
-    carried.enumerate().with_min_len(1024).for_each(|(index, (carried, density))| {
+    let carried = throughput.par_iter_mut().zip(origins.par_iter_mut());
+    carried.enumerate().with_min_len(1024).for_each(|(index, (carried, origin))| {
         let ray = &own.rays[index];
-        *carried = [0.0, 0.0, 0.0, number];
-        *density = bound.params.diffuse_count * most(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
+        let density = bound.params.diffuse_count * most(dot(gbuffer[index].normal, ray.direction), 0.0) / PI;
+        *carried = [0.0, 0.0, 0.0, density];
+        *origin = Origin { pixel: index as u32, direction: bound.params.direction };
         if ray.t_min <= ray.t_max {
             let g = Shown::of(gbuffer, mores, index);
             let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
@@ -226,7 +226,7 @@ pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: 
 /// lead through it; where what is reflected leads below the surface, none. The throughput and by which density the
 /// direction was drawn are noted.
 pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
-    let Pixels { gbuffers: [gbuffer, _], mores: [mores, _], throughput, densities, .. } = pixels;
+    let Pixels { gbuffers: [gbuffer, _], mores: [mores, _], throughput, origins, .. } = pixels;
     let p = bound.params;
     let gloss = |index: usize| {
         let g = Shown::of(gbuffer, mores, index);
@@ -237,7 +237,7 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
         if !s.is_glossy() {
             return none(surface.point);
         }
-        let Drawn { direction, is_through } = s.direction(points4(bound.pixel_of(index), p.stream, p.seed));
+        let Drawn { direction, is_through } = s.direction(points4(bound.pixel_of(index, &[]), p.stream, p.seed));
         let leaves = (dot(surface.normal, direction) > 0.0) != is_through;
         let ended = Ray { direction, ..none(surface.point) };
         if leaves && (is_through || s.density(direction) > 0.0) {
@@ -246,22 +246,26 @@ pub fn generate_glossy(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &
             ended
         }
     });
-    let carried = throughput.par_iter_mut().zip(densities.par_iter_mut()).zip(own.surfaces.par_iter_mut());
-    carried.enumerate().with_min_len(1024).for_each(|(index, ((carried, density), surface))| {
-        (*carried, *density) = ([0.0; 4], 0.0);
+    let carried = throughput.par_iter_mut().zip(origins.par_iter_mut()).zip(own.surfaces.par_iter_mut());
+    carried.enumerate().with_min_len(1024).for_each(|(index, ((carried, origin), surface))| {
+        *carried = [0.0; 4];
+        *origin = Origin { pixel: index as u32, direction: 0 };
         let ray = &own.rays[index];
         if ray.t_min <= ray.t_max {
             let (s, g) = (gloss(index), &gbuffer[index]);
             let left = left_within(bound, g, &materials[g.material as usize], seen.way(index));
             let is_through = dot(seen.surfaces[index].normal, ray.direction) <= 0.0;
-            *density = if is_through { UNSHARED } else { s.density(ray.direction) };
+            let density = if is_through { UNSHARED } else { s.density(ray.direction) };
             let (light, share) = if is_through {
                 (s.passed(ray.direction), s.eta * s.eta)
             } else {
-                (s.reflected(ray.direction), dot(g.normal, ray.direction) / (PI * *density))
+                (s.reflected(ray.direction), dot(g.normal, ray.direction) / (PI * density))
             };
             (0..3).for_each(|k| carried[k] = light[k] * share * left[k]);
-            widen(bound, surface, cones::reflected(*density, s.greatest_alpha()));
+            carried[3] = density;
+            let curvature = if is_through { 0.0 } else { g.curvature };
+            surface.emitter = curvature.to_bits();
+            widen(bound, surface, ray.origin, cones::reflected(density, s.greatest_alpha()), curvature);
         }
     });
 }

@@ -2,7 +2,8 @@
 
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
-    EMITTER_DISTANT, EMITTER_KIND, EMITTER_SPOT, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter, PARAM_BOUNCE, Params,
+    EMITTER_DISTANT, EMITTER_KIND, EMITTER_SPOT, EMITTER_TRIANGLE, EMITTER_TWO_SIDED, Emitter, Origin, PARAM_BOUNCE,
+    Params,
 };
 use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, normalize};
 use crate::math::sampling::{GOLDEN, pcg, points4};
@@ -19,11 +20,11 @@ pub(crate) fn unit(word: u32) -> f32 {
 }
 
 /// Which random numbers the ray of a pixel takes to draw candidate `number` for a lamp: those that start at hits of
-/// bounces take some of their own in every direction of the bounce, whose number lies in the throughput's w.
-pub fn lamp_words(bound: &Bound, index: usize, number: u32, throughput: &[[f32; 4]]) -> [u32; 4] {
-    let mut pixel = bound.pixel_of(index);
+/// bounces take some of their own in every direction that their paths begin with.
+pub fn lamp_words(bound: &Bound, index: usize, number: u32, origins: &[Origin]) -> [u32; 4] {
+    let mut pixel = bound.pixel_of(index, origins);
     if bound.has(PARAM_BOUNCE) {
-        pixel ^= pcg((throughput[index][3] as u32).wrapping_add(1));
+        pixel ^= pcg(origins[index].direction.wrapping_add(1));
     }
     points4(pixel, bound.params.stream, bound.params.seed ^ number.wrapping_mul(GOLDEN))
 }

@@ -4,6 +4,8 @@ use super::lamps::environment_at;
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{COUNTER_NON_FINITE, PARAM_BOUNCE, Params};
 use crate::kernels::vector::{Vec3, dot, each, mix, most, normalize, xyz};
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
 
 /// Radiance of the sky in direction `d`.
 pub fn sky(params: &Params, d: Vec3) -> Vec3 {
@@ -46,14 +48,9 @@ pub fn sunlight(params: &Params, normal: Vec3) -> Vec3 {
     each(|k| params.sun_color[k] * cosine)
 }
 
-/// Adds what the hits of the shaded set show to their pixel; light that is not finite is counted and left out.
-pub fn add_light(
-    bound: &Bound,
-    tally: &mut Tally,
-    radiance: &mut [f32; 4],
-    throughput: Option<&[f32; 4]>,
-    light: Vec3,
-) {
+/// Adds what a hit of the shaded set shows to its pixel, bits of f32 that nothing else writes meanwhile; light that is
+/// not finite is counted and left out.
+pub fn add_light(bound: &Bound, tally: &mut Tally, radiance: &[AtomicU32], throughput: Option<&[f32; 4]>, light: Vec3) {
     let mut color = light;
     if let Some(throughput) = throughput.filter(|_| bound.has(PARAM_BOUNCE)) {
         color = each(|k| color[k] * throughput[k]);
@@ -62,7 +59,7 @@ pub fn add_light(
         tally.add(COUNTER_NON_FINITE, 1);
         return;
     }
-    for (sum, c) in radiance.iter_mut().zip(color) {
-        *sum += c;
+    for (sum, c) in radiance.iter().zip(color) {
+        sum.store((f32::from_bits(sum.load(Relaxed)) + c).to_bits(), Relaxed);
     }
 }

@@ -9,9 +9,10 @@ use crate::kernels::layout::{
 };
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::rays::RaySet;
+use crate::kernels::shade::cones::WIDEST;
 use crate::kernels::shade::more;
 use crate::kernels::texture::sample::settle;
-use crate::kernels::vector::{Vec3, dot, each, most, normalize, unpack4x8unorm, xyz};
+use crate::kernels::vector::{Vec3, cross, dot, each, least, most, normalize, unpack4x8unorm, xyz};
 use crate::math::exact::{divide, square_root};
 use bricks::{Material, NORMAL, SURFACE_MATERIAL, SURFACE_ROTATION_SHIFT};
 use rayon::prelude::*;
@@ -39,6 +40,20 @@ fn unit_or_zero(v: Vec3) -> Vec3 {
     v.map(|x| x * inverse)
 }
 
+/// Of the surface that has such unit normals at the corners of a triangle of half this area; see the kernel.
+fn curvature_of([a, b, c]: [Vec3; 3], area: f32) -> f32 {
+    let covered = cross(each(|k| b[k] - a[k]), each(|k| c[k] - a[k]));
+    dot(covered, covered).sqrt() / most(area, 1.0e-30)
+}
+
+/// Tangent of the angle by which a reflection widens the cone of a camera ray that went so far; see the kernel.
+fn bend(params: &Params, curvature: f32, way: f32) -> f32 {
+    if curvature == 0.0 {
+        return 0.0;
+    }
+    least(way * params.step_y[3] * square_root(curvature), WIDEST.sqrt())
+}
+
 /// What the pixel covers of the textures' unit square, an area, by ray cones; see the kernel.
 pub(crate) fn footprint_of(params: &Params, ray: &Ray, t: f32, surface: &Surface, [a, b, c]: [[f32; 2]; 3]) -> f32 {
     let e1 = [0, 1].map(|k| b[k] - a[k]);
@@ -46,10 +61,12 @@ pub(crate) fn footprint_of(params: &Params, ray: &Ray, t: f32, surface: &Surface
     let uv_area = (e1[0] * e2[1] - e1[1] * e2[0]).abs();
     let way = each(|k| ray.origin[k] - params.origin[k]);
     let length = square_root(dot(ray.direction, ray.direction));
-    let distance = square_root(dot(way, way)) + t * length;
+    let (to_origin, from_origin) = (square_root(dot(way, way)), t * length);
+    let distance = to_origin + from_origin;
     let cosine = most(divide(dot(ray.direction, surface.normal).abs(), length), LEAST_COSINE);
     let width = divide(distance * params.step_y[3], cosine);
-    divide(uv_area, most(surface.area, 1.0e-30)) * (width * width)
+    let spread = divide(bend(params, f32::from_bits(surface.emitter), to_origin) * from_origin, cosine);
+    divide(uv_area, most(surface.area, 1.0e-30)) * (width * width + spread * spread)
 }
 
 /// Of all hits of the shaded set that have none yet. `mores`: of the same hits, or of none.
@@ -104,11 +121,13 @@ fn read(
     let is_stretched = place.flags & INSTANCE_STRETCHED != 0;
     let m = &place.object_from_world;
     let turned = |n: Vec3| each(|k| m[0][k] * n[0] + m[1][k] * n[1] + m[2][k] * n[2]);
-    for (weight, v) in weights.into_iter().zip(&corners) {
+    let mut normals = [[0.0; 3]; 3];
+    for ((weight, v), own) in weights.into_iter().zip(&corners).zip(&mut normals) {
         let (mut n, c) = (octahedral(v.normal), unpack4x8unorm(v.color));
         if is_stretched {
             n = unit_or_zero(turned(n));
         }
+        *own = n;
         normal = each(|k| normal[k] + weight * n[k]);
         uv = [0, 1].map(|k| uv[k] + weight * v.uv[k]);
         color = [0, 1, 2, 3].map(|k| color[k] + weight * c[k]);
@@ -137,6 +156,7 @@ fn read(
         occlusion: 1.0,
         metallic: material.metallic,
         roughness: material.roughness,
+        curvature: curvature_of(normals, surface.area),
         ..GBuffer::default()
     };
     for (place, texture) in (0..).zip(material.textures()) {
@@ -185,4 +205,63 @@ fn read(
         g.state |= GBUFFER_REFRACTS;
     }
     (g, more)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The corners of a triangle around (0, 0, 1) on a surface, and twice its area.
+    fn triangle(point: impl Fn(f32, f32) -> Vec3) -> ([Vec3; 3], f32) {
+        let corners = [point(0.0, 0.0), point(0.02, 0.0), point(0.0, 0.02)];
+        let [a, b, c] = corners;
+        let across = cross(each(|k| b[k] - a[k]), each(|k| c[k] - a[k]));
+        (corners, dot(across, across).sqrt())
+    }
+
+    #[test]
+    fn curvature_is_that_of_balls_and_none_of_what_can_be_unrolled() {
+        for radius in [0.25, 1.0, 40.0] {
+            let (normals, area) = triangle(|u, v| normalize([u, v, 1.0]));
+            let found = curvature_of(normals, radius * radius * area);
+            assert!((found * radius * radius - 1.0).abs() < 1e-3, "{radius}: {found}");
+        }
+        let (_, area) = triangle(|u, v| [u, v, 1.0]);
+        assert_eq!(curvature_of([[0.0, 0.0, 1.0]; 3], area), 0.0, "a plane");
+        let (normals, _) = triangle(|u, _| normalize([u, 0.0, 1.0]));
+        assert_eq!(curvature_of(normals, area), 0.0, "a tube");
+        assert_eq!(curvature_of([[0.0; 3]; 3], 0.0), 0.0, "no normals, no area");
+    }
+
+    /// The width of the cone of a camera ray, by its angle, that a mirror of such a curvature sent back after 5 units,
+    /// another `way` behind it.
+    fn width(curvature: f32, way: f32) -> f32 {
+        let angle = 1e-4;
+        let params = Params { step_y: [0.0, 0.0, 0.0, angle], ..Params::default() };
+        let ray = Ray { origin: [0.0, 0.0, 5.0], direction: [0.0, 0.0, -1.0], ..Ray::default() };
+        let normal = [0.0, 0.0, 1.0];
+        let surface = Surface { normal, area: 1.0, emitter: curvature.to_bits(), ..Surface::default() };
+        footprint_of(&params, &ray, way, &surface, [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]).sqrt() / angle
+    }
+
+    #[test]
+    fn cones_widen_at_balls_and_are_never_wider_than_their_reflections() {
+        let radius: f32 = 0.5;
+        for way in [0.1, 1.0, 4.0, 20.0] {
+            let flat = 5.0 + way;
+            assert!((width(0.0, way) / flat - 1.0).abs() < 1e-5, "{way}: a plane");
+            // A ray beside the axis turns by twice the angle that the normal does; so much beside it its normal lies.
+            let convex = flat + 2.0 * 5.0 * way / radius;
+            let found = width(1.0 / (radius * radius), way);
+            assert!(found > flat && found < convex, "{way}: {flat} {found} {convex}");
+            if way >= 1.0 {
+                assert!(found > 0.44 * convex, "{way}: {found} of {convex}");
+                let concave = (flat - 2.0 * 5.0 * way / radius).abs();
+                assert!(found < 1.1 * concave, "{way}: {found}, from within {concave}");
+            }
+        }
+        // No wider than a ray of a hundred over the hemisphere.
+        let widest = (std::f32::consts::PI / 100.0).sqrt() * 20.0 / 1e-4;
+        assert!((width(1e12, 20.0) / widest - 1.0).abs() < 1e-4);
+    }
 }

@@ -7,10 +7,10 @@ use super::lamps::{
 };
 use super::light::{add_light as add, ambient, background, sunlight};
 use super::more::Shown;
-use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::bound::{Bound, Tally, atomic};
 use crate::kernels::layout::{
     BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBUFFER_BACK, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT,
-    MET, More, NONE, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS,
+    MET, More, NONE, Origin, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS,
     PARAM_PATH, PARAM_SKY, PARAM_SUN, Ray,
 };
 use crate::kernels::rays::RaySet;
@@ -31,10 +31,11 @@ pub struct Pixels {
     pub mores: [Vec<More>; 2],
     /// Summed over the samples of a batch; w counts them.
     pub radiance: Vec<[f32; 4]>,
-    /// Of the light that the rays of set 1 bring.
+    /// Of the light that the rays of set 1 bring; w: by which density their directions were drawn, 0 where no lamp's
+    /// rays bring the same light.
     pub throughput: Vec<[f32; 4]>,
-    /// By which their directions were drawn; 0 where no lamp's rays bring the same light.
-    pub densities: Vec<f32>,
+    /// Where their paths come from.
+    pub origins: Vec<Origin>,
 }
 
 impl Pixels {
@@ -42,21 +43,23 @@ impl Pixels {
     pub fn new(rays: usize, has_more: bool) -> Self {
         let gbuffers = [vec![GBuffer::default(); rays], Vec::new()];
         let mores = [vec![More::default(); if has_more { rays } else { 0 }], Vec::new()];
-        Self { gbuffers, mores, radiance: vec![[0.0; 4]; rays], throughput: Vec::new(), densities: Vec::new() }
+        Self { gbuffers, mores, radiance: vec![[0.0; 4]; rays], throughput: Vec::new(), origins: Vec::new() }
     }
 
     /// For so many pixels; those beyond are forgotten.
     pub fn resize(&mut self, rays: usize) {
-        fn resize<T: Copy + Default>(all: &mut Vec<T>, rays: usize) {
-            if !all.is_empty() {
-                all.resize(rays, T::default());
-            }
-        }
-        self.gbuffers.iter_mut().for_each(|all| resize(all, rays));
-        self.mores.iter_mut().for_each(|all| resize(all, rays));
+        resize(&mut self.gbuffers[0], rays);
+        resize(&mut self.mores[0], rays);
         resize(&mut self.radiance, rays);
+        self.resize_bounces(rays);
+    }
+
+    /// For so many rays of set 1, where there is room for bounces; what is known of those beyond is forgotten.
+    pub fn resize_bounces(&mut self, rays: usize) {
+        resize(&mut self.gbuffers[1], rays);
+        resize(&mut self.mores[1], rays);
         resize(&mut self.throughput, rays);
-        resize(&mut self.densities, rays);
+        resize(&mut self.origins, rays);
     }
 
     /// What is kept of the hits of a set.
@@ -70,7 +73,13 @@ impl Pixels {
         self.gbuffers[1] = vec![GBuffer::default(); rays];
         self.mores[1] = vec![More::default(); self.mores[0].len()];
         self.throughput = vec![[0.0; 4]; rays];
-        self.densities = vec![0.0; rays];
+        self.origins = vec![Origin::default(); rays];
+    }
+}
+
+fn resize<T: Copy + Default>(all: &mut Vec<T>, rays: usize) {
+    if !all.is_empty() {
+        all.resize(rays, T::default());
     }
 }
 
@@ -82,28 +91,36 @@ pub fn clear_gbuffer(bound: &Bound, pixels: &mut Pixels, shaded: usize) {
     }
 }
 
-/// What the rays of set 1 carry: throughputs and densities.
-type Carried<'a> = (&'a [[f32; 4]], &'a [f32]);
+/// What the rays of set 1 carry, and where they come from.
+type Carried<'a> = (&'a [[f32; 4]], &'a [Origin]);
 
-/// Calls `light` for every pixel, with what the rays of all carry, and adds what it gives.
-pub(crate) fn for_each_pixel(
+/// Calls `light` for every hit of the shaded set, with what the rays of set 1 carry, and adds what it gives to the
+/// hit's pixel. Of one set no two hits belong to one.
+pub(crate) fn for_each_hit(
     bound: &Bound,
     pixels: &mut Pixels,
     shaded: usize,
-    light: impl Fn(usize, Shown, &mut [f32; 4], Carried) -> Option<Vec3> + Sync,
+    light: impl Fn(usize, Shown, Carried) -> Option<Vec3> + Sync,
 ) {
-    let Pixels { gbuffers, mores, radiance, throughput, densities, .. } = pixels;
-    let (gbuffer, mores, carried) = (&gbuffers[shaded], &mores[shaded], (&throughput[..], &densities[..]));
-    radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
+    let Pixels { gbuffers, mores, radiance, throughput, origins } = pixels;
+    let (gbuffer, mores, carried) = (&gbuffers[shaded], &mores[shaded], (&throughput[..], &origins[..]));
+    let radiance = atomic(bytemuck::cast_slice_mut(radiance));
+    (0..gbuffer.len().div_ceil(RUN)).into_par_iter().for_each(|run| {
         let mut tally = Tally::default();
-        for (i, radiance) in radiance.iter_mut().enumerate() {
-            let index = run * RUN + i;
-            if let Some(light) = light(index, Shown::of(gbuffer, mores, index), radiance, carried) {
-                add(bound, &mut tally, radiance, carried.0.get(index), light);
+        for index in run * RUN..((run + 1) * RUN).min(gbuffer.len()) {
+            if let Some(light) = light(index, Shown::of(gbuffer, mores, index), carried) {
+                let pixel = 4 * bound.own_pixel(index, origins) as usize;
+                add(bound, &mut tally, &radiance[pixel..pixel + 3], throughput.get(index), light);
             }
         }
         bound.counters.add(&tally);
     });
+}
+
+/// Counts the sample for the pixels whose camera ray is traced.
+fn count_samples(radiance: &mut [[f32; 4]], seen: &RaySet) {
+    let traced = radiance.par_iter_mut().zip(&seen.rays).with_min_len(RUN).filter(|(_, ray)| is_traced(ray));
+    traced.for_each(|(radiance, _)| radiance[3] += 1.0);
 }
 
 /// For how many rays one that met nothing counts: those beside it were not traced ([`crate::secondary::roma::twin`]).
@@ -170,17 +187,15 @@ fn seen_emission(bound: &Bound, g: &GBuffer, m: &Material, seen: &RaySet, index:
 /// first shading of a sample counts it.
 pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, materials: &[Material]) {
     let params = bound.params;
-    for_each_pixel(bound, pixels, shaded, |index, g, radiance, (_, densities)| {
+    if !bound.has(PARAM_BOUNCE) {
+        count_samples(&mut pixels.radiance, seen);
+    }
+    for_each_hit(bound, pixels, shaded, |index, g, (throughput, _)| {
         let ray = &seen.rays[index];
         if !is_traced(ray) {
             return None;
         }
-        let mut density = 0.0;
-        if bound.has(PARAM_BOUNCE) {
-            density = densities[index];
-        } else {
-            radiance[3] += 1.0;
-        }
+        let density = if bound.has(PARAM_BOUNCE) { throughput[index][3] } else { 0.0 };
         if seen.surfaces[index].leaf == NONE {
             // What occupancy maps met is lit otherwise.
             let is_miss = bound.has(PARAM_MISS) && seen.hits[index].id != MET;
@@ -216,7 +231,7 @@ pub fn add_light(
     (seen, own): (&RaySet, &RaySet),
     materials: &[Material],
 ) {
-    for_each_pixel(bound, pixels, shaded, |index, g, _, (throughput, _)| {
+    for_each_hit(bound, pixels, shaded, |index, g, (_, origins)| {
         let ray = &own.rays[index];
         if !is_traced(ray) || own.hits[index].id != NONE {
             return None;
@@ -242,7 +257,7 @@ pub fn add_light(
             each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / chosen.area)
         } else if bound.has(PARAM_ENVIRONMENT) {
             let chosen = &own.surfaces[index];
-            let drawn = environment_sample(bound, lamp_words(bound, index, chosen.emitter, throughput));
+            let drawn = environment_sample(bound, lamp_words(bound, index, chosen.emitter, origins));
             density = drawn_density(bound, &drawn);
             drawn_light(bound, &drawn).map(|c| c * cosine / (PI * chosen.area))
         } else {
@@ -282,7 +297,7 @@ pub fn add_occlusion(
     (seen, own): (&RaySet, &RaySet),
     materials: &[Material],
 ) {
-    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
+    for_each_hit(bound, pixels, shaded, |index, g, _| {
         if !is_traced(&own.rays[index]) || own.hits[index].id != NONE {
             return None;
         }

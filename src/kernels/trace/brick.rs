@@ -113,7 +113,7 @@ impl BrickRay<'_> {
             area,
             source: best.source,
             pending: surface.pending,
-            emitter: 0,
+            emitter: surface.emitter,
         };
     }
 }

@@ -236,7 +236,7 @@ impl Points {
             area: self.area[lane],
             source: best.source,
             pending: surface.pending,
-            emitter: 0,
+            emitter: surface.emitter,
         };
     }
 }

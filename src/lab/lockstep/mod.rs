@@ -138,7 +138,7 @@ impl Findings {
 
     fn gbuffers(&mut self, context: &str, bound: f32, gpu: &[GBuffer], cpu: &[GBuffer]) {
         let numbers = |g: &GBuffer| {
-            let others = [g.handedness, g.occlusion, g.metallic, g.roughness];
+            let others = [g.handedness, g.occlusion, g.metallic, g.roughness, g.curvature];
             [&g.albedo[..], &g.normal, &g.emission, &g.weights, &g.tangent, &others].concat()
         };
         let whole = |g: &GBuffer| [g.state, g.material];
@@ -151,13 +151,15 @@ impl Findings {
         }
     }
 
-    fn mores(&mut self, context: &str, bound: f32, gpu: &[More], cpu: &[More]) {
+    /// Of those hits of which they are kept.
+    fn mores(&mut self, context: &str, bound: f32, kept: &[bool], [gpu, cpu]: [&[More]; 2]) {
         let numbers = |x: &More| {
             let shares = [x.specular_weight, x.sheen_roughness, x.coat, x.anisotropy];
             let others = [x.coat_roughness, x.film, x.film_thickness];
             [&x.specular[..], &x.sheen, &x.normal, &x.along, &shares, &others].concat()
         };
-        for (g, c) in gpu.iter().zip(cpu) {
+        let read = kept.iter().zip(gpu.iter().zip(cpu)).filter(|(kept, _)| **kept);
+        for (_, (g, c)) in read {
             self.numbers("further textures", context, bound, &numbers(g), &numbers(c));
             self.words("further textures that wait", context, &[g.state], &[c.state]);
         }
@@ -180,7 +182,7 @@ impl Findings {
             let compared =
                 by_kernels.filter(|(name, _)| counts || !["nodes_visited", "triangles_tested"].contains(name));
             let own = [r.list_entries.into(), r.most_selected.into()];
-            compared.map(|(_, count)| count).chain(own).chain(r.own).collect::<Vec<u64>>()
+            compared.map(|(_, count)| count).chain(own).chain([r.paths.into()]).chain(r.own).collect::<Vec<u64>>()
         };
         self.words("counters", context, &numbers(gpu), &numbers(cpu));
         let demand = |r: &Report| -> (Vec<[u32; 3]>, Vec<f32>) {
@@ -228,12 +230,10 @@ impl Lockstep {
         let surfaces = match pass.set() {
             0 => Vec::new(),
             1 => self.gpu.read_surfaces(Pass::Primary)?,
-            _ => self.gpu.read_surfaces(Pass::Glossy)?,
+            _ => self.gpu.read_surfaces(Pass::Path(1))?,
         };
         self.gpu.run(pass, &[step], bricks)?;
         self.cpu.run(pass, &[step], bricks)?;
-        // Where rays by which paths go on belong.
-        let pass = if let Step::Continue(number) = step { Pass::Path(number) } else { pass };
         let (rays, mut own) = (self.gpu.read_rays(pass)?, self.cpu.read_rays(pass)?);
         let mut findings = self.findings.lock().expect("findings");
         if pass == Pass::Primary {
@@ -255,12 +255,30 @@ impl Lockstep {
             }
         }
         let mut spreads = self.cpu.read_surfaces(pass)?;
+        let is_path = matches!(step, Step::Continue(_));
         for (i, (g, c)) in self.gpu.read_surfaces(pass)?.iter().zip(&mut spreads).enumerate() {
             let is_traced = rays[i].t_min <= rays[i].t_max && own[i].t_min <= own[i].t_max;
             let wider = if self.defect == Some(Defect::Cones) { 1.0 + 1.0 / 64.0 } else { 1.0 };
             let [of_gpu, of_cpu] = [spread_of(g), wider * spread_of(c)];
             if is_traced && (of_gpu > 0.0 || of_cpu > 0.0) {
                 findings.numbers("spreads", context, SPREADS, &[1.0], &[of_cpu / of_gpu]);
+            }
+            if is_traced && is_path && !is_grazing(i, &rays[i]) {
+                findings.numbers("throughputs", context, self.bound, &g.point, &c.point);
+                findings.words("origins", context, &[[g.emitter, g.triangle]], &[[c.emitter, c.triangle]]);
+                findings.numbers("curvatures", context, self.bound, &g.normal, &c.normal);
+            }
+            if is_path {
+                c.normal = g.normal;
+            } else if pass == Pass::Glossy {
+                findings.numbers(
+                    "curvatures",
+                    context,
+                    self.bound,
+                    &[g.emitter].map(f32::from_bits),
+                    &[c.emitter].map(f32::from_bits),
+                );
+                c.emitter = g.emitter;
             }
             c.pending = g.pending;
         }
@@ -280,9 +298,11 @@ impl Lockstep {
         let set = pass.set().saturating_sub(1);
         let gbuffer = self.gpu.read_gbuffer_of(set)?;
         self.findings.lock().expect("findings").gbuffers(context, self.bound, &gbuffer, self.cpu.gbuffer_of(set));
-        *self.cpu.gbuffer_of(set) = gbuffer;
         let more = self.gpu.read_more_of(set)?;
-        self.findings.lock().expect("findings").mores(context, self.bound, &more, self.cpu.more_of(set));
+        let kept: Vec<bool> = gbuffer.iter().map(|hit| self.gpu.keeps_more(hit)).collect();
+        let mores = [&more, &*self.cpu.more_of(set)];
+        self.findings.lock().expect("findings").mores(context, self.bound, &kept, mores.map(Vec::as_slice));
+        *self.cpu.gbuffer_of(set) = gbuffer;
         *self.cpu.more_of(set) = more;
         if self.defect == Some(Defect::Lookups) {
             self.cpu.gbuffer_of(set).iter_mut().for_each(|g| g.uv[0] += 0.25);
@@ -290,7 +310,8 @@ impl Lockstep {
         Ok(())
     }
 
-    fn compare(&mut self, context: &str, pass: Pass, steps: &[Step]) -> Result<(), ExecutorError> {
+    /// Compares what the rays of a pass have met.
+    fn compare_hits(&mut self, context: &str, pass: Pass) -> Result<(), ExecutorError> {
         let hits = (self.gpu.read_hits(pass)?, self.cpu.read_hits(pass)?);
         let surfaces = (self.gpu.read_surfaces(pass)?, self.cpu.read_surfaces(pass)?);
         let rays = self.gpu.read_rays(pass)?;
@@ -310,11 +331,27 @@ impl Lockstep {
         let (of_gpu, of_cpu) = (of_traced(&surfaces.0), of_traced(&surfaces.1));
         findings.words("surfaces", context, &of_gpu.0, &of_cpu.0);
         findings.numbers("probabilities", context, self.bound, &of_gpu.1, &of_cpu.1);
+        Ok(())
+    }
+
+    fn compare(&mut self, context: &str, pass: Pass, steps: &[Step]) -> Result<(), ExecutorError> {
+        // These come before the rays of their pass are made.
+        let reads_hits = |step: &Step| {
+            matches!(step, Step::ClearAttributes | Step::Resolve | Step::Sample | Step::SampleCoarser | Step::Shade(_))
+        };
+        if !steps.iter().all(reads_hits) {
+            self.compare_hits(context, pass)?;
+        }
+        let rays = self.gpu.read_rays(pass)?;
+        let mut findings = self.findings.lock().expect("findings");
         let has_lists =
             |step: &Step| matches!(step, Step::Lists | Step::ShortLists | Step::SortByNumber | Step::SortNodesNear);
         if steps.iter().any(has_lists) {
-            let (bounds, lists, list, selection) = self.gpu.read_tiles()?;
+            let (mut bounds, mut lists, list, selection) = self.gpu.read_tiles()?;
             let own = self.cpu.tiles();
+            // There may be more tiles than the rows of the pass have.
+            bounds.truncate(own.bounds.len());
+            lists.truncate(own.lists.len());
             findings.words("bounds of tiles", context, &bounds, &own.bounds);
             // Which tiles have work is noted place by place there, and in any order.
             let placed = |l: &TileList| TileList { chosen: 0, rooted: 0, ..*l };
@@ -377,10 +414,11 @@ impl Lockstep {
             let gbuffer = (self.gpu.read_gbuffer()?, self.cpu.read_gbuffer()?);
             findings.gbuffers(context, self.bound, &gbuffer.0, &gbuffer.1);
             let set = pass.set().saturating_sub(1);
-            let gbuffer = (self.gpu.read_gbuffer_of(set)?, self.cpu.gbuffer_of(set));
-            findings.gbuffers(context, self.bound, &gbuffer.0, gbuffer.1);
+            let gbuffer = self.gpu.read_gbuffer_of(set)?;
+            findings.gbuffers(context, self.bound, &gbuffer, self.cpu.gbuffer_of(set));
             let more = (self.gpu.read_more_of(set)?, self.cpu.more_of(set));
-            findings.mores(context, self.bound, &more.0, more.1);
+            let kept: Vec<bool> = gbuffer.iter().map(|hit| self.gpu.keeps_more(hit)).collect();
+            findings.mores(context, self.bound, &kept, [&more.0, more.1]);
         }
         Ok(())
     }
@@ -435,23 +473,23 @@ impl Executor for Lockstep {
             let names = list.iter().map(|dispatch| dispatch.kernel);
             self.findings.lock().expect("findings").kernels.extend(names);
         }
-        let mut pass = pass;
         let rest = match steps {
             [step, rest @ ..]
                 if matches!(step, Step::Generate | Step::Continue(_)) || own_kernel(step) == Some("dvf_cosine") =>
             {
                 self.generate(&context, pass, *step, bricks)?;
-                if let Step::Continue(number) = *step {
-                    // Both sets hold what was made.
-                    let (rays, surfaces) = (self.gpu.read_rays(pass)?, self.gpu.read_surfaces(pass)?);
-                    self.cpu.set_rays(pass, &rays);
-                    self.cpu.set_surfaces(pass, surfaces);
-                    pass = Pass::Path(number);
-                }
                 rest
             }
             all => all,
         };
+        if let [Step::Continue(number), ..] = *steps {
+            let gpu = self.gpu.run(pass, rest, bricks)?;
+            let cpu = self.cpu.run(pass, rest, bricks)?;
+            self.findings.lock().expect("findings").report(&context, &gpu, &cpu);
+            // What was moved lies in the set before.
+            self.compare_hits(&context, Pass::Path(number))?;
+            return Ok(gpu);
+        }
         let Some((before, &[last @ (Step::Sample | Step::SampleCoarser)])) = rest.split_last_chunk::<1>() else {
             return self.both(&context, pass, rest, bricks);
         };

@@ -2,13 +2,13 @@
 
 use super::field::{Chord, FieldView};
 use super::shape::Shape;
-use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::bound::{Bound, Tally, atomic};
 use crate::kernels::layout::{
     COUNTER_RAYS_ANSWERED, COUNTER_RAYS_SHORTENED, DISPLACEMENT_ABSENT, DisplacementCarrier, DisplacementField,
     DisplacementNode, DisplacementOwn, DisplacementPosition, Hit, MET, NONE, PARAM_ANY_HIT, Ray, STATE_GEOMETRY,
 };
 use crate::kernels::rays::RaySet;
-use crate::kernels::table::{atomic, words};
+use crate::kernels::table::words;
 use crate::kernels::vector::{Vec3, each, least, most};
 use crate::math::exact::{divide, square_root};
 use crate::schedule::ExecutorError;

@@ -6,7 +6,7 @@ use super::fresh::FreshView;
 use super::maps::{CIRCLE, TILE, sum};
 use super::mask;
 use super::mask::{OCCLUDED, UNKNOWN};
-use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::bound::{Bound, Tally, atomic};
 use crate::kernels::layout::{
     COUNTER_RAYS_ANSWERED, DVF_BOTH, DVF_DOUBT, DVF_HAMMERSLEY, DVF_PAPER, DVF_RENEW, DVF_ROUND, DVF_WALK, DvfGrid,
     DvfOwn, DvfTriangle, GBuffer, INSTANCE_MIRRORED, MET, NONE, Params, Ray, T_INFINITE,
@@ -16,8 +16,8 @@ use crate::kernels::shade::generate::{for_each_leaving, leaving};
 use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::shade::lamps::unit;
 use crate::kernels::shade::light::{ambient, background};
-use crate::kernels::shade::shade::{Pixels, for_each_pixel, is_traced as is_ray};
-use crate::kernels::table::{atomic, words};
+use crate::kernels::shade::shade::{Pixels, for_each_hit, is_traced as is_ray};
+use crate::kernels::table::words;
 use crate::kernels::trace::levels::is_pending;
 use crate::kernels::vector::{Vec3, each, most3};
 use crate::math::exact::{
@@ -468,7 +468,7 @@ pub fn dvf_light(
     (seen, own): (&RaySet, &RaySet),
     materials: &[Material],
 ) {
-    for_each_pixel(bound, pixels, shaded, |index, g, _, _| {
+    for_each_hit(bound, pixels, shaded, |index, g, _| {
         if seen.surfaces[index].leaf == NONE {
             return None;
         }

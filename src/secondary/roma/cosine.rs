@@ -77,7 +77,7 @@ pub fn roma_draw(
     let of = Maps::of(bound, buffers)?;
     // Where nothing is asked of what is met, nothing is of where it is.
     let is_turned = !bound.has(PARAM_ANY_HIT);
-    let Pixels { gbuffers, densities, .. } = pixels;
+    let Pixels { gbuffers, throughput, .. } = pixels;
     let gbuffer = &gbuffers[shaded];
     let RaySet { rays, hits, surfaces } = own;
     let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks_mut(RUN));
@@ -101,8 +101,8 @@ pub fn roma_draw(
         bound.counters.add(&tally);
     });
     if is_turned {
-        for ((density, ray), g) in densities.iter_mut().zip(rays).zip(gbuffer) {
-            *density = p.diffuse_count * most(dot(g.normal, ray.direction), 0.0) * FRAC_1_PI;
+        for ((carried, ray), g) in throughput.iter_mut().zip(rays).zip(gbuffer) {
+            carried[3] = p.diffuse_count * most(dot(g.normal, ray.direction), 0.0) * FRAC_1_PI;
         }
     }
     Ok(())

@@ -13,7 +13,7 @@ kernels! {
     static KERNELS, names;
 
     rsm_write: "rsm/rsm_write" Own [] |b, t| rsm_write(b, t.buffers, t.pixels, t.seen, t.materials);
-    rsm_light: "rsm/rsm_light" Own [] |b, t| rsm_light(b, t.buffers, t.pixels, t.seen);
+    rsm_light: "rsm/rsm_light" Own [] |b, t| rsm_light(b, t.buffers, (t.pixels, t.shaded), t.seen);
 }
 
 /// Number of the buffer of maps in the frame.

@@ -1,13 +1,13 @@
 //! Reflective shadow maps: twins of `shaders/rsm/rsm_write.wgsl` and `rsm_light.wgsl`.
 
-use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::bound::Bound;
 use crate::kernels::layout::{MET, NONE, RSM_PERSPECTIVE, RsmMap, RsmOwn, RsmTexel};
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::gloss::Gloss;
 use crate::kernels::shade::lamps::{lamp_words, shines, unit};
-use crate::kernels::shade::light::{add_light, sunlight};
+use crate::kernels::shade::light::sunlight;
 use crate::kernels::shade::more::Shown;
-use crate::kernels::shade::shade::Pixels;
+use crate::kernels::shade::shade::{Pixels, for_each_hit};
 use crate::kernels::table::words;
 use crate::kernels::vector::{Vec3, dot, each, most};
 use crate::math::exact::divide;
@@ -22,9 +22,6 @@ const MOVED: f32 = 0.8;
 const ACROSS: f32 = 1.2;
 /// And in depth.
 const IN_DEPTH: f32 = 3.6;
-
-/// Pixels that a task lights in a row.
-const RUN: usize = 1024;
 
 /// Writes a block of texels of a map from the hits of set 0.
 pub fn rsm_write(
@@ -118,31 +115,23 @@ fn reflected(bound: &Bound, (maps, texels): (&[RsmMap], &[RsmTexel]), p: Vec3, v
 pub fn rsm_light(
     bound: &Bound,
     buffers: &mut [Vec<u32>],
-    pixels: &mut Pixels,
+    (pixels, shaded): (&mut Pixels, usize),
     seen: &RaySet,
 ) -> Result<(), ExecutorError> {
     let [maps, texels] = words(buffers)?;
     let maps = &bytemuck::cast_slice(maps)[..bound.own::<RsmOwn>().maps as usize];
     let looked_up = (maps, bytemuck::cast_slice(texels));
-    let Pixels { radiance, throughput, .. } = pixels;
-    radiance.par_chunks_mut(RUN).enumerate().for_each(|(run, radiance)| {
-        let mut tally = Tally::default();
-        for (i, radiance) in radiance.iter_mut().enumerate() {
-            let index = run * RUN + i;
-            let ray = &seen.rays[index];
-            let is_traced = ray.t_min <= ray.t_max;
-            if !is_traced || seen.hits[index].id != MET {
-                continue;
-            }
-            let met = &seen.surfaces[index];
-            let words = lamp_words(bound, index, 0, throughput);
-            let p = each(|k| met.point[k] + MOVED * met.area * (unit(words[k]) - 0.5));
-            let light = reflected(bound, looked_up, p, met.normal, met.area);
-            if light.iter().any(|&c| c != 0.0) {
-                add_light(bound, &mut tally, radiance, throughput.get(index), light);
-            }
+    for_each_hit(bound, pixels, shaded, |index, _, (_, origins)| {
+        let ray = &seen.rays[index];
+        let is_traced = ray.t_min <= ray.t_max;
+        if !is_traced || seen.hits[index].id != MET {
+            return None;
         }
-        bound.counters.add(&tally);
+        let met = &seen.surfaces[index];
+        let words = lamp_words(bound, index, 0, origins);
+        let p = each(|k| met.point[k] + MOVED * met.area * (unit(words[k]) - 0.5));
+        let light = reflected(bound, looked_up, p, met.normal, met.area);
+        light.iter().any(|&c| c != 0.0).then_some(light)
     });
     Ok(())
 }

@@ -127,7 +127,7 @@ fn vector(v: [f32; 3]) -> DVec3 {
 }
 
 #[test]
-fn reflected_rays_are_as_wide_as_their_lobes() {
+fn reflected_rays_are_as_wide_as_their_lobes_and_the_curvature_say() {
     let folder = folder();
     let [scene, _] = metal_cities(folder.path());
     let file = levelled(&scene);
@@ -137,11 +137,18 @@ fn reflected_rays_are_as_wide_as_their_lobes() {
         for tolerance in [0.25, 0.5] {
             let options = format!("--lod {tolerance} --schedule {schedule} --effects glossy");
             let seen = Seen::of(&scene, &file, &options);
+            // What normals that differ over the width of a pixel's cone at the hit add.
+            let by_curvature = |i: usize| {
+                let way = vector(seen.rays[i].origin) - vector(seen.camera_rays[i].origin);
+                seen.pixel.powi(2) * way.length_squared() * f64::from(seen.gbuffer[i].curvature)
+            };
+            let curved = seen.traced().filter(|&i| by_curvature(i) > seen.pixel.powi(2)).count();
+            assert!(curved > 0, "no ray is widened by curvature");
             let angle_square = |i: usize| {
                 let (g, light) = (&seen.gbuffer[i], vector(seen.rays[i].direction).normalize());
                 let alpha = f64::from(g.roughness).powi(2).max(0.001);
                 let view = -vector(seen.camera_rays[i].direction).normalize();
-                (0.01 / density(vector(g.normal), view, light, alpha)).min(alpha * alpha)
+                (0.01 / density(vector(g.normal), view, light, alpha)).min(alpha * alpha) + by_curvature(i)
             };
             let mirrors = seen.traced().filter(|&i| angle_square(i) < seen.pixel.powi(2)).count();
             assert!(mirrors > 20, "{mirrors} rays are narrower than pixels");

@@ -29,6 +29,8 @@ fn paths_do_not_depend_on_the_cache() {
             "--cache 15% --schedule demand --evict lru",
             "--cache 15% --schedule chc --tile 16 --bands 2",
             "--cache 100% --schedule plain",
+            // With fronts, rays of paths that go on keep their places.
+            "--cache 100% --schedule chc --fronts on",
         ] {
             let (found, bounces) = run(options);
             assert!(found == first, "{adapter}: {options}: frames differ");

@@ -428,7 +428,7 @@ fn twins_agree_with_their_kernels() {
         Variant { dvf: Some(visibility(16)), ..VARIANT },
         Variant { dvf: Some(DvfSettings { hammersley: false, both: true, round: true, ..visibility(16) }), ..VARIANT },
         Variant { dvf: Some(DvfSettings { dilate: false, cells: Cells::Auto, ..visibility(32) }), ..VARIANT },
-        Variant { fronts: true, ..VARIANT },
+        Variant { fronts: true, bounces: 2, ..VARIANT },
         Variant { fronts: true, threshold: 3, ..VARIANT },
         Variant { fronts: true, without: &[MultiQueries, TighterBounds], everything_fits: true, ..VARIANT },
     ];
