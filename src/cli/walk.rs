@@ -6,6 +6,7 @@ use super::watcher::{UntilStopped, Watcher};
 use crate::cli::output::{is_quiet, note, print, warn};
 use crate::counters::{COLUMNS, Column, Kind, Record};
 use crate::output::atomic;
+use crate::session::checkpoints::Checkpoint;
 use crate::session::{Pictures, Session, Settings, summary};
 use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Result, bail};
@@ -47,7 +48,8 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     session.prepare(&mut Watcher::new(&progress, stop, settings))?;
     progress.finish();
     warn(session.take_warnings());
-    let mut pictures = Pictures::create(output, settings)?;
+    let are_joined = session.renderer().bands().len() > 1;
+    let mut pictures = Pictures::create(output, settings, are_joined)?;
     let mut lines = atomic::JsonLines::create(&output.join("records.jsonl"))?;
     let measures = !settings.checkpoints.is_empty();
     let checkpoints = measures.then(|| atomic::JsonLines::create(&output.join("checkpoints.jsonl")));
@@ -55,27 +57,44 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     let progress = Progress::new();
     let mut watcher = Watcher::new(&progress, stop, settings);
     let mut records: Vec<Record> = Vec::new();
-    let mut finished = 0;
-    while finished < settings.frames && !stop.load(Ordering::Relaxed) {
-        let preview = settings.progressive.then(|| pictures.preview());
-        let Some(frame) = session.frame_watched(finished, watcher.of_frame(finished, preview))? else { break };
-        warn(session.take_warnings());
-        pictures.frame(&frame)?;
+    // Notes what a frame did, once its picture is written.
+    let mut note_frame = |(own, measured): (Vec<Record>, Vec<Checkpoint>)| -> Result<()> {
         if let Some(checkpoints) = &mut checkpoints {
-            frame.checkpoints.iter().try_for_each(|checkpoint| checkpoints.push(checkpoint).map(drop))?;
+            measured.iter().try_for_each(|checkpoint| checkpoints.push(checkpoint).map(drop))?;
         }
-        info!("{}", told(finished, &frame.records));
-        for record in frame.records {
+        for record in own {
             let line = lines.push(&record)?;
             if json {
                 print(&line)?;
             }
             records.push(record);
         }
+        Ok(())
+    };
+    let (mut finished, mut in_writing, mut failed) = (0, None, None);
+    while finished < settings.frames && !stop.load(Ordering::Relaxed) {
+        let preview = settings.progressive.then(|| pictures.preview());
+        let mut frame = match session.frame_watched(finished, watcher.of_frame(finished, preview)) {
+            Ok(Some(frame)) => frame,
+            Ok(None) => break,
+            Err(error) => {
+                failed = Some(error);
+                break;
+            }
+        };
+        warn(session.take_warnings());
+        info!("{}", told(finished, &frame.records));
+        let did = (std::mem::take(&mut frame.records), std::mem::take(&mut frame.checkpoints));
+        pictures.frame(frame)?;
+        in_writing.replace(did).map_or(Ok(()), &mut note_frame)?;
         finished += 1;
     }
     progress.finish();
-    let (video, commands) = pictures.finish()?;
+    let (video, commands) = pictures.finish(failed.is_some())?;
+    in_writing.map_or(Ok(()), &mut note_frame)?;
+    if let Some(error) = failed {
+        return Err(error);
+    }
     let left_out = session.left_out(&mut UntilStopped(stop))?;
     let summary = summary::summary(&mut session, &records, left_out, video);
     atomic::write(&output.join("summary.json"), (serde_json::to_string_pretty(&summary)? + "\n").as_bytes())?;

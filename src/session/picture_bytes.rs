@@ -3,7 +3,7 @@
 
 use crate::frame::{SampleNoise, Second, Seen};
 use crate::kernels::denoise;
-use crate::kernels::layout::{DenoiseGiven, DenoiseSecond, DenoiseSeen, GBuffer, Hit, Ray, Surface};
+use crate::kernels::layout::{DenoiseGiven, DenoiseSecond, DenoiseSeen, GBuffer, Hit, Origin, Ray, Surface};
 use crate::session::Settings;
 
 /// Bytes that a pixel takes.
@@ -48,8 +48,10 @@ impl PictureBytes {
         let bytes = |sizes: &[usize]| sizes.iter().sum::<usize>() as u64;
         let set = bytes(&[size_of::<Ray>(), size_of::<Hit>(), size_of::<Surface>()]);
         let shading = (size_of::<GBuffer>() * if has_more { 2 } else { 1 }) as u64;
-        // Light that comes by a bounce has a set of rays, what shading keeps, a share and a density more.
-        let bounces = if settings.effects.diffuse || settings.effects.glossy { set + shading + 20 } else { 0 };
+        // Light that comes by a bounce has a set of rays and what shading keeps more; a share and a density, where it
+        // comes from, and a count for 64 of it.
+        let carried = 16 + size_of::<Origin>() as u64 + 1;
+        let bounces = if settings.effects.diffuse || settings.effects.glossy { set + shading + carried } else { 0 };
         let device = 2 * set + shading + 16 + bounces;
         let has_guides = settings.denoise || settings.taa;
         let guides = if has_guides {
@@ -62,10 +64,12 @@ impl PictureBytes {
         let (aovs, layers) = if settings.aov { (AOVS, AOV_LAYERS) } else { (0, 0) };
         let sums = SUMS + if settings.noise.is_some() { NOISE } else { 0 };
         let sessions = if settings.measure_error { 2 } else { 1 };
+        // Of the frame before, which is written meanwhile; joined ones are written before the next.
+        let written = if settings.frames > 1 { MEAN + aovs } else { 0 };
         Self {
             device: sessions * device,
             filter,
-            host: sessions * sums + guides + aovs + given.max(read).max(layers),
+            host: sessions * sums + guides + aovs + given.max(read).max(layers) + written,
             band: sums + read + if has_guides { GUIDE_SUMS } else { 0 },
             joined: MEAN + guides + aovs + (given + filter).max(layers).max(FINISH),
         }
