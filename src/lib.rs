@@ -80,6 +80,7 @@ pub mod math;
 pub mod metrics;
 pub mod output;
 pub mod picture;
+pub mod query;
 #[cfg(feature = "lab")]
 pub mod reference;
 pub mod scene;

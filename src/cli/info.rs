@@ -1,9 +1,11 @@
 //! `info`: what a `.bricks` file holds, and where a triangle comes from.
 
-use super::levels::Levels;
+mod instances;
+mod levels;
+mod quality;
+
+use super::cached;
 use super::options::args::InfoArgs;
-use super::quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
-use super::{cached, instances};
 use crate::cli::output::{print, print_json};
 use crate::secondary::displacement::is_similarity;
 use crate::session::Origin;
@@ -15,6 +17,8 @@ use bricks::{
     BRICK_WIDE, Brick, DisplacementField, Instance, LIGHT_DISTANT, LIGHT_POINT, LIGHT_SPOT, Manifest, NEAR_STEPS,
     ORIGIN_STEPS, PunctualLight, Resident, SceneFile, Texture,
 };
+use levels::Levels;
+use quality::{Bin, PerTriangle, Sections, Trees, histogram, human_histogram, loaded_attribute_bytes};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};

@@ -9,16 +9,14 @@ pub mod compare;
 pub mod convert;
 pub mod demo;
 pub mod info;
-pub mod instances;
 pub mod interrupt;
 #[cfg(feature = "lab")]
 pub mod lab;
-pub mod levels;
 pub mod man;
 pub mod memory;
 pub mod options;
 pub mod output;
-pub mod quality;
+pub mod query;
 pub mod repair;
 pub mod replay;
 pub mod scene;
@@ -91,6 +89,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         #[cfg(feature = "serve")]
         Command::Serve(args) => serve::run(args),
         Command::Trace(args) => trace::run(args),
+        Command::Query(args) => query::run(args),
         Command::Replay(args) => replay::run(args),
         Command::Compare(args) => compare::run(args),
         #[cfg(feature = "lab")]

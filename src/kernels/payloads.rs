@@ -63,6 +63,18 @@ impl<'a> BrickView<'a> {
         each(|k| barrier(barrier(l[k] + offset_high[k]) + barrier(l[3 + k] + offset_low[k])))
     }
 
+    /// The vertices of a triangle in f64, in device units of the object, relative to the brick's origin; exact.
+    #[inline(always)]
+    pub fn corners(&self, triangle: u32) -> [[f64; 3]; 3] {
+        let corner = |index: u32| {
+            let at = if self.is_wide { 6 } else { 3 } * index as usize;
+            let l = &self.vertices[at..at + if self.is_wide { 6 } else { 3 }];
+            // High and low part have 24 bits each and a common step.
+            [0, 1, 2].map(|k| f64::from(l[k]) + if self.is_wide { f64::from(l[3 + k]) } else { 0.0 })
+        };
+        self.indices.of(triangle).map(corner)
+    }
+
     /// The vertices of a triangle in the object's frame.
     #[inline(always)]
     pub fn vertices(&self, triangle: u32, offset_high: Vec3, offset_low: Vec3) -> [Vec3; 3] {

@@ -3,6 +3,7 @@
 pub mod alias;
 pub mod angles;
 pub mod blue_noise;
+pub mod crossing;
 pub mod exact;
 pub mod median;
 pub mod octahedral;

@@ -62,21 +62,59 @@ pub struct Rays {
 /// The file cannot be read, is no `.npy` file, has another type, shape or order, or is shorter or longer than its
 /// header says.
 pub fn read_rays(path: &Path) -> Result<Rays> {
+    let Rows { rows, shape } = read_rows(path, "rays", &[6, 8], |row| {
+        let mut numbers = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f64::INFINITY];
+        numbers[..row.len()].copy_from_slice(row);
+        bytemuck::cast(numbers)
+    })?;
+    Ok(Rays { rays: rows, shape })
+}
+
+/// What an array holds: an element a row, and its shape without the last axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rows<T> {
+    /// The elements, row by row.
+    pub rows: Vec<T>,
+    /// Shape of the array without its last axis.
+    pub shape: Vec<u64>,
+}
+
+/// Reads points: float64 or float32 of shape (..., 3), as [`read_rays`] reads rays.
+///
+/// # Errors
+/// As of [`read_rays`].
+pub fn read_points(path: &Path) -> Result<Rows<[f64; 3]>> {
+    read_rows(path, "points", &[3], |row| std::array::from_fn(|k| row[k]))
+}
+
+/// Reads pairs of points: float64 or float32 of shape (..., 6), as [`read_rays`] reads rays.
+///
+/// # Errors
+/// As of [`read_rays`].
+pub fn read_pairs(path: &Path) -> Result<Rows<[[f64; 3]; 2]>> {
+    read_rows(path, "pairs of points", &[6], |row| [0, 3].map(|first| std::array::from_fn(|k| row[first + k])))
+}
+
+/// Reads `what`, rows of as many numbers as one of `widths`, by `row`.
+fn read_rows<T>(path: &Path, what: &str, widths: &[u64], row: impl Fn(&[f64]) -> T) -> Result<Rows<T>> {
     let name = path.display();
-    let mut file = File::open(path).with_context(|| format!("{name}: cannot open the rays"))?;
-    let length = file.metadata().with_context(|| format!("{name}: cannot read the rays"))?.len();
+    let mut file = File::open(path).with_context(|| format!("{name}: cannot open the {what}"))?;
+    let length = file.metadata().with_context(|| format!("{name}: cannot read the {what}"))?.len();
     let (header, header_bytes) = read_header(&mut file)
-        .with_context(|| format!("{name}: not a NumPy file; write it with numpy.save(path, rays)"))?;
+        .with_context(|| format!("{name}: not a NumPy file; write it with numpy.save(path, array)"))?;
     let header = NpyFile::new(Cursor::new(header))
-        .with_context(|| format!("{name}: its NumPy header is damaged; write it with numpy.save(path, rays)"))?;
-    let remedy = "rays are float64 or float32 of shape (..., 8) or (..., 6); use numpy.ascontiguousarray(rays, \
-                  dtype=numpy.float64)";
+        .with_context(|| format!("{name}: its NumPy header is damaged; write it with numpy.save(path, array)"))?;
+    let shapes: Vec<String> = widths.iter().rev().map(|width| format!("(..., {width})")).collect();
+    let remedy = format!(
+        "{what} are float64 or float32 of shape {}; use numpy.ascontiguousarray(array, dtype=numpy.float64)",
+        shapes.join(" or ")
+    );
     let is = |kind: &str| kind.parse::<TypeStr>().is_ok_and(|t| header.dtype() == DType::new_scalar(t));
     let Some((_, number_bytes, read)) = NUMBERS.iter().find(|(kind, ..)| is(kind)) else {
         bail!("{name}: its type is {}; {remedy}", header.dtype().descr());
     };
     let (shape, columns) = match header.shape() {
-        [shape @ .., columns @ (6 | 8)] => (shape.to_vec(), *columns),
+        [shape @ .., columns] if widths.contains(columns) => (shape.to_vec(), *columns),
         other => bail!("{name}: its shape is {other:?}; {remedy}"),
     };
     let rows = shape.iter().try_fold(1u64, |rows, &n| rows.checked_mul(n));
@@ -88,23 +126,23 @@ pub fn read_rays(path: &Path) -> Result<Rays> {
     let data = rows.and_then(|rows| rows.checked_mul(row_bytes));
     ensure!(
         data.and_then(|bytes| bytes.checked_add(header_bytes)) == Some(length),
-        "{name}: found {length} bytes, but the header promises rays of {row_bytes} bytes in shape {shape:?}; write it \
-         again"
+        "{name}: found {length} bytes, but the header promises {what} of {row_bytes} bytes in shape {shape:?}; write \
+         it again"
     );
     // As many as the file has bytes for.
-    let mut rays = Vec::with_capacity(usize::try_from(rows.unwrap_or(0)).context("too many rays for this machine")?);
+    let count = usize::try_from(rows.unwrap_or(0)).with_context(|| format!("too many {what} for this machine"))?;
+    let mut all = Vec::with_capacity(count);
     // The header's reader may have read ahead; the file itself stands behind the header.
     let mut file = BufReader::new(file);
-    let mut row = vec![0; row_bytes as usize];
-    for _ in 0..rows.unwrap_or(0) {
-        file.read_exact(&mut row).with_context(|| format!("{name}: cannot read the rays"))?;
-        let mut numbers = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f64::INFINITY];
-        for (number, bytes) in numbers.iter_mut().zip(row.chunks_exact(*number_bytes as usize)) {
+    let (mut bytes, mut numbers) = (vec![0; row_bytes as usize], vec![0.0; columns as usize]);
+    for _ in 0..count {
+        file.read_exact(&mut bytes).with_context(|| format!("{name}: cannot read the {what}"))?;
+        for (number, bytes) in numbers.iter_mut().zip(bytes.chunks_exact(*number_bytes as usize)) {
             *number = read(bytes);
         }
-        rays.push(bytemuck::cast(numbers));
+        all.push(row(&numbers));
     }
-    Ok(Rays { rays, shape })
+    Ok(Rows { rows: all, shape })
 }
 
 /// Reads a number from as many bytes as it has.
@@ -176,10 +214,9 @@ fn scalar(text: &'static str) -> Result<DType> {
 /// # Errors
 /// The file cannot be written.
 pub fn write_hits(path: &Path, hits: &[Hit], shape: &[u64], normals: bool) -> Result<()> {
-    let field = |name: &str, text| Ok::<_, anyhow::Error>(Field { name: name.into(), dtype: scalar(text)? });
-    let mut fields = vec![field("t", "<f8")?, field("triangle", "<u4")?, field("u", "<f4")?, field("v", "<f4")?];
+    let mut fields = vec![("t", "<f8", 1), ("triangle", "<u4", 1), ("u", "<f4", 1), ("v", "<f4", 1)];
     if normals {
-        fields.push(Field { name: "normal".into(), dtype: DType::Array(3, Box::new(scalar("<f4")?)) });
+        fields.push(("normal", "<f4", 3));
     }
     let mut data = Vec::with_capacity(hits.len() * if normals { 32 } else { 20 });
     for hit in hits {
@@ -191,7 +228,7 @@ pub fn write_hits(path: &Path, hits: &[Hit], shape: &[u64], normals: bool) -> Re
             data.extend(hit.normal.iter().flat_map(|x| x.to_le_bytes()));
         }
     }
-    write(path, DType::Record(fields), shape, &data)
+    write_records(path, &fields, &data, shape)
 }
 
 /// Writes an array of `shape`: whether something was hit, an element a ray.
@@ -200,7 +237,29 @@ pub fn write_hits(path: &Path, hits: &[Hit], shape: &[u64], normals: bool) -> Re
 /// The file cannot be written.
 pub fn write_any(path: &Path, hit: &[bool], shape: &[u64]) -> Result<()> {
     let data: Vec<u8> = hit.iter().map(|&b| u8::from(b)).collect();
-    write(path, scalar("|b1")?, shape, &data)
+    write_numbers(path, "|b1", &data, shape)
+}
+
+/// Writes an array of `shape` of numbers of a NumPy type such as `<u4`, whose bytes are `data`.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_numbers(path: &Path, dtype: &'static str, data: &[u8], shape: &[u64]) -> Result<()> {
+    write(path, scalar(dtype)?, shape, data)
+}
+
+/// Writes a structured array of `shape`: fields with their NumPy types and, of vectors, how many numbers they have, and
+/// the bytes of all elements, packed.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_records(path: &Path, fields: &[(&str, &'static str, u64)], data: &[u8], shape: &[u64]) -> Result<()> {
+    let field = |&(name, dtype, count): &(&str, &'static str, u64)| {
+        let one = scalar(dtype)?;
+        let dtype = if count == 1 { one } else { DType::Array(count, Box::new(one)) };
+        Ok(Field { name: name.into(), dtype })
+    };
+    write(path, DType::Record(fields.iter().map(field).collect::<Result<_>>()?), shape, data)
 }
 
 #[cfg(test)]

@@ -70,9 +70,9 @@
 use super::assessment::{Assessment, SLACK, distance_to_segment, orientation, perimeter};
 use super::bvh::Padding;
 use super::instance::{Extremes, frobenius, linear, translation};
-use super::predicate::crossing;
 use super::ray::TruthRay;
 use super::truth::Truth;
+use crate::math::crossing::crossing;
 use bricks::ORIGIN_STEPS;
 use glam::{DMat3, DVec3};
 
@@ -164,7 +164,7 @@ impl Frame {
 /// What a kernel can make of `ray` and the triangle with this index.
 pub(super) fn assess_index(truth: &Truth, ray: &TruthRay, index: usize) -> Assessment {
     let local = Local::new(truth, ray, index);
-    let met = crossing(ray, truth.world_vertices(index));
+    let met = crossing(&ray.line(), truth.world_vertices(index));
     let size = local.d.map(f64::abs);
     let kz = (0..3).fold(0, |best, k| if size[k] > size[best] { k } else { best });
     let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);

@@ -16,7 +16,6 @@ mod decode;
 mod instance;
 mod judge;
 mod opacity;
-mod predicate;
 mod ray;
 mod truth;
 

@@ -1,5 +1,7 @@
 //! Rays as truth takes them.
 
+use crate::math::crossing::Line;
+
 /// A ray whose origin is given relative to a reference point, so that nothing is rounded.
 ///
 /// It is { reference + origin + t direction : t_min ≤ t ≤ t_max }, in world units; the interval is closed.
@@ -46,6 +48,12 @@ impl TruthRay {
             t_max: t_max.into(),
             exclude: None,
         }
+    }
+
+    /// The line that it lies on.
+    pub fn line(&self) -> Line {
+        let Self { reference, origin, direction, .. } = *self;
+        Line { reference, origin, direction }
     }
 
     /// The ray, passing through triangle `id` (global). Other triangles at the same place it meets.

@@ -6,8 +6,8 @@ use super::decode;
 use super::decode::{DecodeError, TruthObject, TruthTriangle};
 use super::instance::{Extremes, TruthInstance};
 use super::opacity::{Opacities, Passing};
-use super::predicate::{Crossing, crossing, order};
 use super::ray::TruthRay;
+use crate::math::crossing::{Crossing, crossing, order};
 use bricks::{INSTANCE_IDENTITY, SceneFile};
 use std::cmp::Ordering;
 
@@ -196,7 +196,7 @@ impl Truth {
         let within = |hit: &Crossing| ray.t_min <= hit.t && hit.t <= ray.t_max;
         let opacity = self.stored(index).2.opacity();
         let stops = |hit: &Crossing| opacity.is_none_or(|opacity| !self.opacities.passes(&opacity, hit.weights));
-        crossing(ray, self.world_vertices(index)).filter(within).filter(stops)
+        crossing(&ray.line(), self.world_vertices(index)).filter(within).filter(stops)
     }
 
     /// What a kernel may do with a ray that meets a triangle, as assessed.
@@ -209,7 +209,7 @@ impl Truth {
     fn consider(&self, ray: &TruthRay, index: usize, best: &mut Option<(Crossing, usize)>) {
         let Some(hit) = self.crossing(ray, index) else { return };
         let better = best.as_ref().is_none_or(|(other, other_index)| {
-            match order(ray, (&hit, self.world_vertices(index)), (other, self.world_vertices(*other_index))) {
+            match order(&ray.line(), (&hit, self.world_vertices(index)), (other, self.world_vertices(*other_index))) {
                 Ordering::Less => true,
                 // Indices are in the order of ids.
                 Ordering::Equal => index < *other_index,

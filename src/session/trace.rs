@@ -3,7 +3,7 @@
 mod given;
 mod refine;
 
-pub use given::{Approach, DeviceRay, approach, check, device_ray};
+pub use given::{Approach, DeviceRay, Scaled, approach, check, device_ray};
 
 use super::opened::Opened;
 use crate::counters::Counters;

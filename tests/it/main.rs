@@ -19,6 +19,7 @@ mod command {
     #[cfg(unix)]
     mod pages;
     mod progress;
+    mod query;
     mod repair;
     mod replay;
     mod resume;

@@ -5,6 +5,7 @@
 use super::group_args::OfView;
 use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
+use super::query_args::QueryArgs;
 use super::scene_kind::{SceneKind, scene_help};
 use super::units::UNITS;
 use crate::cli::bake_displacement::Subjects;
@@ -64,6 +65,8 @@ pub enum Command {
     Serve(Box<ServeArgs>),
     /// Find the closest hits of given rays
     Trace(TraceArgs),
+    /// Ask about geometry: all that rays meet, nearest points, distances, what lies inside, what is visible
+    Query(QueryArgs),
     /// Replay recorded brick requests with other cache sizes and policies
     Replay(ReplayArgs),
     /// Compare an image with a reference: RMSE, relMSE, bias, FLIP

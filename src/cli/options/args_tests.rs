@@ -290,6 +290,7 @@ fn help_explains_units_and_defaults() {
         "demo",
         "info",
         "man",
+        "query",
         "repair",
         "replay",
         "scene",

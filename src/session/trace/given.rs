@@ -45,15 +45,16 @@ fn halves(log2: i32) -> [f64; 2] {
 
 /// A direction scaled by a power of two, exactly.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scaled {
+pub struct Scaled {
     /// The direction, its largest component in 1..2.
-    pub(super) direction: DVec3,
+    pub direction: DVec3,
     /// The given direction is 2^this times as long.
     log2: i32,
 }
 
 impl Scaled {
-    pub(super) fn of(direction: [f64; 3]) -> Self {
+    /// Of a direction that has a length.
+    pub fn of(direction: [f64; 3]) -> Self {
         let largest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
         // The exponent field, also of a subnormal.
         let log2 = largest.log2().floor().clamp(-1074.0, 1023.0) as i32;
@@ -61,8 +62,14 @@ impl Scaled {
         Self { direction: DVec3::from_array(direction) * a * b, log2 }
     }
 
+    /// A distance in lengths of the scaled direction, `t` in those of the given one.
+    pub fn scaled(&self, t: f64) -> f64 {
+        let [a, b] = halves(self.log2);
+        t * a * b
+    }
+
     /// A distance in lengths of the given direction, `t` in those of the scaled one.
-    pub(super) fn given(&self, t: f64) -> f64 {
+    pub fn given(&self, t: f64) -> f64 {
         let [a, b] = halves(-self.log2);
         t * a * b
     }

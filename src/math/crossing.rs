@@ -4,7 +4,6 @@
 //! V = d·(c×a), W = d·(a×b) weight a, b and c. The ray's line meets the closed triangle where no two of them have
 //! opposite signs and not all are zero; then D = U + V + W is not zero either, and t = N / D with N = a·(b×c).
 
-use super::ray::TruthRay;
 use glam::DVec3;
 use num_bigint::BigInt;
 use num_traits::ToPrimitive;
@@ -17,20 +16,31 @@ const ROUNDING: f64 = f64::EPSILON / 2.0;
 /// up; doubled against terms of higher order.
 const TRIPLE_ERROR: f64 = 24.0 * ROUNDING;
 
+/// A ray's line, whose origin is given relative to a reference point, so that nothing is rounded. All are finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line {
+    /// The point that `origin` is relative to.
+    pub reference: [f64; 3],
+    /// Origin.
+    pub origin: [f64; 3],
+    /// Direction, of any length but zero.
+    pub direction: [f64; 3],
+}
+
 /// A point of the ray's line on a triangle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Crossing {
+pub struct Crossing {
     /// Parameter.
-    pub(super) t: f64,
+    pub t: f64,
     /// Bound of the error of `t`.
     t_error: f64,
     /// Weights of the vertices; they sum to 1.
-    pub(super) weights: [f64; 3],
+    pub weights: [f64; 3],
 }
 
 /// A vertex relative to the ray's origin, and a bound of the magnitudes that went into it.
-fn relative(ray: &TruthRay, vertex: [f64; 3]) -> (DVec3, DVec3) {
-    let (from_reference, origin) = (DVec3::from(vertex) - DVec3::from(ray.reference), DVec3::from(ray.origin));
+fn relative(line: &Line, vertex: [f64; 3]) -> (DVec3, DVec3) {
+    let (from_reference, origin) = (DVec3::from(vertex) - DVec3::from(line.reference), DVec3::from(line.origin));
     (from_reference - origin, from_reference.abs() + origin.abs())
 }
 
@@ -77,8 +87,8 @@ fn sign(x: &BigInt) -> i32 {
 }
 
 impl Exact {
-    fn new(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Self {
-        let given = [ray.reference, ray.origin, ray.direction].into_iter().chain(triangle);
+    fn new(line: &Line, triangle: [[f64; 3]; 3]) -> Self {
+        let given = [line.reference, line.origin, line.direction].into_iter().chain(triangle);
         let exponents = given.flatten().map(parts).filter(|part| part.0 != 0).map(|part| part.1);
         let unit = exponents.min().unwrap_or(0);
         let whole = |x: f64| match parts(x) {
@@ -86,9 +96,9 @@ impl Exact {
             (mantissa, exponent) => BigInt::from(mantissa) << (exponent - unit),
         };
         let relative = |vertex: [f64; 3]| {
-            std::array::from_fn(|k| whole(vertex[k]) - whole(ray.reference[k]) - whole(ray.origin[k]))
+            std::array::from_fn(|k| whole(vertex[k]) - whole(line.reference[k]) - whole(line.origin[k]))
         };
-        Self { vertices: triangle.map(relative), d: ray.direction.map(whole) }
+        Self { vertices: triangle.map(relative), d: line.direction.map(whole) }
     }
 
     /// U, V, W.
@@ -104,10 +114,37 @@ impl Exact {
     }
 }
 
-/// Where the line of `ray` meets the closed triangle, whatever t; `None` if it does not, or lies in its plane.
-pub(super) fn crossing(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
-    let [(a, ma), (b, mb), (c, mc)] = triangle.map(|vertex| relative(ray, vertex));
-    let d = DVec3::from(ray.direction);
+/// Where `line`, which meets a triangle, does so: by its plane, from edges that are rounded once and not from vertices
+/// far from each other. `None` where the triangle is seen so much from its side, or is so small or narrow, that f64 has
+/// less than 40 bits of t or 30 of the weights.
+fn by_plane(line: &Line, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
+    let [a, b, c] = triangle.map(DVec3::from);
+    let d = DVec3::from(line.direction);
+    let (u, v) = (b - a, c - a);
+    let normal = u.cross(v);
+    let (from, reach) = relative(line, triangle[0]);
+    let (numerator, determinant) = (normal.dot(from), normal.dot(d));
+    // Each component of the normal is wrong by four roundings of its permanent, each sum by three more.
+    let spread = permanent(u.abs(), v.abs());
+    let determinant_error = 8.0 * ROUNDING * spread.dot(d.abs());
+    let numerator_error = 8.0 * ROUNDING * spread.dot(from.abs()) + 2.0 * ROUNDING * normal.abs().dot(reach);
+    let relative_error = numerator_error / numerator.abs() + determinant_error / determinant.abs() + 2.0 * ROUNDING;
+    let t = numerator / determinant;
+    let t_error = 2.0 * relative_error * t.abs();
+    // The point relative to the first vertex, and how far it may be off.
+    let point = d * t - from;
+    let off = (d * t_error).length() + 4.0 * ROUNDING * (reach.length() + (d * t).length());
+    let area = normal.length_squared();
+    let weights = [point.cross(v).dot(normal) / area, u.cross(point).dot(normal) / area];
+    let weight_error = 2.0 * off * u.length().max(v.length()) / area.sqrt();
+    let is_good = relative_error < 1e-12 && weight_error < 1e-9;
+    is_good.then(|| Crossing { t, t_error, weights: [1.0 - weights[0] - weights[1], weights[0], weights[1]] })
+}
+
+/// Where `line` meets the closed triangle, whatever t; `None` if it does not, or lies in its plane.
+pub fn crossing(line: &Line, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
+    let [(a, ma), (b, mb), (c, mc)] = triangle.map(|vertex| relative(line, vertex));
+    let d = DVec3::from(line.direction);
     let normals = [b.cross(c), c.cross(a), a.cross(b)];
     let edges = normals.map(|n| d.dot(n));
     let errors = [(mb, mc), (mc, ma), (ma, mb)].map(|(p, q)| TRIPLE_ERROR * d.abs().dot(permanent(p, q)));
@@ -117,18 +154,13 @@ pub(super) fn crossing(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Option<Crossi
     if (0..3).any(|k| certain(k, 1.0)) && (0..3).any(|k| certain(k, -1.0)) {
         return None;
     }
-    let all_certain = (0..3).all(|k| edges[k].abs() > errors[k]);
-    let determinant = edges[0] + edges[1] + edges[2];
-    let numerator = a.dot(normals[0]);
-    let numerator_error = TRIPLE_ERROR * ma.dot(permanent(mb, mc));
-    let determinant_error = errors[0] + errors[1] + errors[2] + 2.0 * ROUNDING * determinant.abs();
-    let relative_error = numerator_error / numerator.abs() + determinant_error / determinant.abs() + 2.0 * ROUNDING;
-    if all_certain && relative_error < 1e-12 {
-        let t = numerator / determinant;
-        return Some(Crossing { t, t_error: 2.0 * relative_error * t.abs(), weights: edges.map(|e| e / determinant) });
+    if (0..3).all(|k| edges[k].abs() > errors[k])
+        && let Some(crossing) = by_plane(line, triangle)
+    {
+        return Some(crossing);
     }
 
-    let exact = Exact::new(ray, triangle);
+    let exact = Exact::new(line, triangle);
     let exact_edges = exact.edges();
     let signs = exact_edges.each_ref().map(sign);
     if (signs.contains(&1) && signs.contains(&-1)) || signs == [0; 3] {
@@ -141,12 +173,12 @@ pub(super) fn crossing(ray: &TruthRay, triangle: [[f64; 3]; 3]) -> Option<Crossi
 }
 
 /// The order of two crossings of one ray along it, exactly.
-pub(super) fn order(ray: &TruthRay, p: (&Crossing, [[f64; 3]; 3]), q: (&Crossing, [[f64; 3]; 3])) -> Ordering {
+pub fn order(line: &Line, p: (&Crossing, [[f64; 3]; 3]), q: (&Crossing, [[f64; 3]; 3])) -> Ordering {
     let apart = p.0.t - q.0.t;
     if apart.abs() > p.0.t_error + q.0.t_error + ROUNDING * apart.abs() {
         return apart.total_cmp(&0.0);
     }
-    let ((n0, d0), (n1, d1)) = (Exact::new(ray, p.1).fraction(), Exact::new(ray, q.1).fraction());
+    let ((n0, d0), (n1, d1)) = (Exact::new(line, p.1).fraction(), Exact::new(line, q.1).fraction());
     let difference = sign(&(n0 * &d1 - n1 * &d0)) * sign(&d0) * sign(&d1);
     difference.cmp(&0)
 }
@@ -155,15 +187,15 @@ pub(super) fn order(ray: &TruthRay, p: (&Crossing, [[f64; 3]; 3]), q: (&Crossing
 mod tests {
     use super::*;
 
-    fn ray(origin: [f64; 3], direction: [f64; 3]) -> TruthRay {
-        TruthRay::new(origin, direction, 0.0, f64::INFINITY)
+    fn line(origin: [f64; 3], direction: [f64; 3]) -> Line {
+        Line { reference: [0.0; 3], origin, direction }
     }
 
     const TRIANGLE: [[f64; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
     #[test]
     fn inside_on_edges_and_outside() {
-        let hit = crossing(&ray([0.25, 0.5, 3.0], [0.0, 0.0, -2.0]), TRIANGLE).unwrap();
+        let hit = crossing(&line([0.25, 0.5, 3.0], [0.0, 0.0, -2.0]), TRIANGLE).unwrap();
         assert_eq!((hit.t, hit.weights), (1.5, [0.25, 0.25, 0.5]));
         for (x, y, met) in [
             (0.0, 0.0, true),
@@ -174,11 +206,11 @@ mod tests {
             (1.0, 0.0, true),
             (1.0 + f64::EPSILON, 0.0, false),
         ] {
-            assert_eq!(crossing(&ray([x, y, 1.0], [0.0, 0.0, -1.0]), TRIANGLE).is_some(), met, "{x} {y}");
+            assert_eq!(crossing(&line([x, y, 1.0], [0.0, 0.0, -1.0]), TRIANGLE).is_some(), met, "{x} {y}");
             let [a, b, c] = TRIANGLE;
-            assert_eq!(crossing(&ray([x, y, 1.0], [0.0, 0.0, -1.0]), [c, b, a]).is_some(), met, "{x} {y}");
+            assert_eq!(crossing(&line([x, y, 1.0], [0.0, 0.0, -1.0]), [c, b, a]).is_some(), met, "{x} {y}");
         }
-        assert!(crossing(&ray([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0]), TRIANGLE).is_none(), "in the plane");
+        assert!(crossing(&line([-1.0, 0.25, 0.0], [1.0, 0.0, 0.0]), TRIANGLE).is_none(), "in the plane");
     }
 
     #[test]
@@ -188,12 +220,12 @@ mod tests {
         let triangle = [[far, far, 0.0], [far + 1.0, far + 1.0, 0.0], [far, far + 1.0, 0.0]];
         let beside = 2.0f64.powi(-20);
         for (shift, met) in [(0.0, true), (beside, true), (-beside, false)] {
-            let ray = TruthRay {
+            let line = Line {
                 reference: [-3.0 * far, 5.0 * far, 0.0],
                 origin: [4.0 * far + 0.5, 0.5 - 4.0 * far + shift, 1.0],
-                ..ray([0.0; 3], [0.0, 0.0, -1.0])
+                ..line([0.0; 3], [0.0, 0.0, -1.0])
             };
-            assert_eq!(crossing(&ray, triangle).is_some(), met, "{shift}");
+            assert_eq!(crossing(&line, triangle).is_some(), met, "{shift}");
         }
     }
 
@@ -204,10 +236,10 @@ mod tests {
         let p = [plane(-5.0, -7.0), plane(11.0, 0.0), plane(-1.0, 13.0)];
         let q = [plane(-6.0, -2.0), plane(7.0, -3.0), plane(1.0, 17.0)];
         let lower = q.map(|[x, y, z]| [x, y, z - 2.0f64.powi(-48)]);
-        let ray = ray([0.7, 0.1, 9.3], [0.01, 0.02, -0.7]);
-        let at = |t| crossing(&ray, t).unwrap();
-        assert_eq!(order(&ray, (&at(p), p), (&at(q), q)), Ordering::Equal);
-        assert_eq!(order(&ray, (&at(p), p), (&at(lower), lower)), Ordering::Less);
-        assert_eq!(order(&ray, (&at(lower), lower), (&at(p), p)), Ordering::Greater);
+        let line = line([0.7, 0.1, 9.3], [0.01, 0.02, -0.7]);
+        let at = |t| crossing(&line, t).unwrap();
+        assert_eq!(order(&line, (&at(p), p), (&at(q), q)), Ordering::Equal);
+        assert_eq!(order(&line, (&at(p), p), (&at(lower), lower)), Ordering::Less);
+        assert_eq!(order(&line, (&at(lower), lower), (&at(p), p)), Ordering::Greater);
     }
 }

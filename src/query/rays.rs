@@ -1,0 +1,200 @@
+//! All that rays meet: how many triangles, which, or whether any.
+
+use super::hits::Met;
+use super::space::{Placed, Slabs};
+use super::sweep::Sweep;
+use super::{Intersections, Queries, Watch};
+use crate::math::crossing::{Crossing, Line, crossing};
+use crate::output::npy::Ray;
+use crate::session::trace::check;
+use anyhow::{Context, Result, ensure};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Of the greatest coordinate of a point that is to see another: how much of its surroundings is left out, so that a
+/// point that was rounded to f32 does not hide behind its own surface.
+const ROUNDED: f64 = 1.0 / (1u32 << 22) as f64;
+
+/// A ray as boxes and triangles take it; its interval is closed.
+struct Along {
+    line: Line,
+    slabs: Slabs,
+    t_min: f64,
+    t_max: f64,
+}
+
+impl Along {
+    fn new(ray: &Ray) -> Self {
+        let &Ray { origin, direction, t_min, t_max } = ray;
+        let t_min = t_min.max(0.0);
+        let slabs = Slabs::new(origin, direction, t_min, t_max);
+        Self { line: Line { reference: [0.0; 3], origin, direction }, slabs, t_min, t_max }
+    }
+
+    /// Calls `visit` with every triangle of a brick that the ray meets, its vertices and where; false ends it.
+    #[inline(always)]
+    fn meet(&self, brick: &Placed, open: &mut Vec<u32>, mut visit: impl FnMut(u32, [DVec3; 3], &Crossing) -> bool) {
+        brick.walk(&self.slabs, open, |triangle| {
+            let vertices = brick.vertices(triangle);
+            let met = crossing(&self.line, vertices.map(|vertex| vertex.to_array()));
+            met.filter(|met| (self.t_min..=self.t_max).contains(&met.t))
+                .is_none_or(|met| visit(triangle, vertices, &met))
+        });
+    }
+}
+
+/// Rays that list what they meet.
+struct Listed<'a>(&'a [Ray]);
+
+impl Sweep for Listed<'_> {
+    type Found = Met;
+
+    type Asks = Slabs;
+
+    fn asks(&self, item: usize) -> Option<Slabs> {
+        Some(Along::new(&self.0[item]).slabs)
+    }
+
+    fn meet(&self, item: usize, leaf: u32, brick: &Placed, open: &mut Vec<u32>, found: &mut Vec<Met>) {
+        Along::new(&self.0[item]).meet(brick, open, |triangle, vertices, &Crossing { t, weights, .. }| {
+            found.push(Met { item, t, id: brick.id(triangle), leaf, triangle, weights, vertices });
+            true
+        });
+    }
+}
+
+/// Rays that count what they meet.
+struct Counted<'a> {
+    rays: &'a [Ray],
+    /// Whether ids are told, so that copies of a triangle in several bricks count once.
+    by_id: bool,
+}
+
+impl Sweep for Counted<'_> {
+    /// The ray, and how many triangles it met or the id of one.
+    type Found = (usize, u32);
+
+    type Asks = Slabs;
+
+    fn asks(&self, item: usize) -> Option<Slabs> {
+        Some(Along::new(&self.rays[item]).slabs)
+    }
+
+    fn meet(&self, item: usize, _: u32, brick: &Placed, open: &mut Vec<u32>, found: &mut Vec<(usize, u32)>) {
+        let mut count = 0;
+        Along::new(&self.rays[item]).meet(brick, open, |triangle, _, _| {
+            count += 1;
+            if self.by_id {
+                found.push((item, brick.id(triangle)));
+            }
+            true
+        });
+        if !self.by_id && count > 0 {
+            found.push((item, count));
+        }
+    }
+}
+
+/// Rays that end where they meet anything.
+struct Stopped<'a> {
+    rays: &'a [Ray],
+    stopped: &'a [AtomicBool],
+}
+
+impl Stopped<'_> {
+    fn is_stopped(&self, item: usize) -> bool {
+        self.stopped[item].load(Ordering::Relaxed)
+    }
+}
+
+impl Sweep for Stopped<'_> {
+    type Found = ();
+
+    type Asks = Slabs;
+
+    fn asks(&self, item: usize) -> Option<Slabs> {
+        (!self.is_stopped(item)).then(|| Along::new(&self.rays[item]).slabs)
+    }
+
+    fn meet(&self, item: usize, _: u32, brick: &Placed, open: &mut Vec<u32>, _: &mut Vec<()>) {
+        if !self.is_stopped(item) {
+            Along::new(&self.rays[item]).meet(brick, open, |_, _, _| {
+                self.stopped[item].store(true, Ordering::Relaxed);
+                false
+            });
+        }
+    }
+}
+
+fn checked(rays: &[Ray]) -> Result<()> {
+    let bad = rays.par_iter().enumerate().find_map_first(|(number, ray)| Some((number, check(ray).err()?)));
+    bad.map_or(Ok(()), |(number, error)| Err(error).with_context(|| format!("ray {number}")))
+}
+
+impl Queries {
+    /// How many triangles each ray meets, at any t of its interval.
+    ///
+    /// # Errors
+    /// A ray that is none, by its number; a damaged brick; what `watch` says.
+    pub fn count_intersections(&self, rays: &[Ray], watch: &mut Watch) -> Result<Vec<u32>> {
+        checked(rays)?;
+        let mut counts = vec![0u32; rays.len()];
+        let mut copies = Vec::new();
+        let by_id = self.has_copies;
+        let mut take = |(item, what): (usize, u32)| match by_id {
+            true => copies.push((item, what)),
+            false => counts[item] += what,
+        };
+        self.sweep(rays.len(), &Counted { rays, by_id }, &mut take, watch)?;
+        // A triangle that lies in several bricks counts once.
+        copies.par_sort_unstable();
+        copies.dedup();
+        copies.iter().for_each(|&(item, _)| counts[item] += 1);
+        Ok(counts)
+    }
+
+    /// All triangles that each ray meets, by increasing t and, at equal t, id. What rays pass through by its alpha is
+    /// there as well.
+    ///
+    /// # Errors
+    /// As of [`Queries::count_intersections`].
+    pub fn list_intersections(&self, rays: &[Ray], watch: &mut Watch) -> Result<Intersections> {
+        checked(rays)?;
+        let mut all = Vec::new();
+        self.sweep(rays.len(), &Listed(rays), &mut |met| all.push(met), watch)?;
+        all.par_sort_unstable_by(|a, b| (a.item, a.id).cmp(&(b.item, b.id)).then(a.t.total_cmp(&b.t)));
+        all.dedup_by_key(|met| (met.item, met.id));
+        all.par_sort_unstable_by(|a, b| a.item.cmp(&b.item).then(a.t.total_cmp(&b.t)).then(a.id.cmp(&b.id)));
+        let mut starts = vec![0u64; rays.len() + 1];
+        all.iter().for_each(|met| starts[met.item + 1] += 1);
+        for ray in 0..rays.len() {
+            starts[ray + 1] += starts[ray];
+        }
+        Ok(Intersections { starts, hits: self.hits(&all)? })
+    }
+
+    /// Whether the way from each point of `from` to the one of `to` at the same place is free. At either end 2^-22 of
+    /// its greatest coordinate is left out, so that points on surfaces see what is before them.
+    ///
+    /// # Errors
+    /// Points that are not as many or not finite, by their number; a damaged brick; what `watch` says.
+    pub fn visibility(&self, from: &[[f64; 3]], to: &[[f64; 3]], watch: &mut Watch) -> Result<Vec<bool>> {
+        ensure!(from.len() == to.len(), "{} points to see {}: they must be as many", from.len(), to.len());
+        super::check_points(from)?;
+        super::check_points(to)?;
+        let ray = |(from, to): (&[f64; 3], &[f64; 3])| {
+            let [a, b] = [from, to].map(|p| DVec3::from_array(*p));
+            let [near, far] = [a, b].map(|end| ROUNDED * end.abs().max_element() / (b - a).length());
+            // Of points that are one, or as good as one, nothing is left between them.
+            let (t_min, t_max) = if near + far < 1.0 { (near, 1.0 - far) } else { (1.0, 0.0) };
+            let direction = if a == b { DVec3::X } else { b - a };
+            Ray { origin: *from, direction: direction.to_array(), t_min, t_max }
+        };
+        let rays: Vec<Ray> = from.par_iter().zip(to).map(ray).collect();
+        checked(&rays)?;
+        let stopped: Vec<AtomicBool> = rays.iter().map(|_| AtomicBool::new(false)).collect();
+        self.sweep(rays.len(), &Stopped { rays: &rays, stopped: &stopped }, &mut |()| (), watch)?;
+        Ok(stopped.into_iter().map(|stopped| !stopped.into_inner()).collect())
+    }
+}

@@ -1,0 +1,361 @@
+//! The scene in f64, where it lies: boxes of the top level and of bricks' nodes, and triangles.
+//!
+//! Vertices are those of the file, on their lattice, placed by the f64 matrix of their instance and rounded once.
+//! Boxes are grown by more than any rounding here, so that what misses a box meets nothing in it.
+
+use crate::kernels::payloads::BrickView;
+use crate::kernels::trace::node::inner_before;
+use crate::session::trace::Scaled;
+use bricks::{Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Node, Resident, TOP_LEAF, TopNode2};
+use glam::DVec3;
+
+/// Of coordinates that took part: many times the f64 roundings of what is computed from them.
+const MARGIN: f64 = 1.0 / (1u64 << 46) as f64;
+/// Greatest inverse of a direction's component: times any coordinate it is finite.
+const MOST_INVERSE: f64 = f64::from_bits((900 + 1023) << 52);
+
+/// Axis-aligned boxes side by side, by axes, world units; those that are no child's have no points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Boxes<const N: usize> {
+    min: [[f64; N]; 3],
+    max: [[f64; N]; 3],
+    /// By how much all are grown: more than the roundings of what is computed from them, and of where they lie.
+    pad: f64,
+}
+
+/// What asks whether it may meet what is in boxes.
+pub(super) trait Meets {
+    /// Which boxes it may meet, a bit each.
+    fn meets<const N: usize>(&self, boxes: &Boxes<N>) -> u32;
+}
+
+impl<const N: usize> Boxes<N> {
+    /// No more than the squared distance of `point` from anything in each box.
+    #[inline(always)]
+    pub(super) fn distances_squared(&self, point: DVec3) -> [f64; N] {
+        let pad = self.pad.max(MARGIN * point.abs().max_element());
+        let mut sums = [0.0; N];
+        for k in 0..3 {
+            for (sum, (min, max)) in sums.iter_mut().zip(self.min[k].iter().zip(&self.max[k])) {
+                let gap = (min - pad - point[k]).max(point[k] - max - pad).max(0.0);
+                *sum += gap * gap;
+            }
+        }
+        sums.map(|sum| sum * (1.0 - MARGIN))
+    }
+}
+
+/// A half-line from a point along x.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AlongX(pub(super) DVec3);
+
+impl Meets for AlongX {
+    #[inline(always)]
+    fn meets<const N: usize>(&self, boxes: &Boxes<N>) -> u32 {
+        let p = self.0;
+        let pad = boxes.pad.max(MARGIN * p.abs().max_element());
+        (0..N).fold(0, |mask, i| {
+            let is_within = |k: usize| p[k] >= boxes.min[k][i] - pad && p[k] <= boxes.max[k][i] + pad;
+            mask | u32::from(p.x <= boxes.max[0][i] + pad && is_within(1) && is_within(2)) << i
+        })
+    }
+}
+
+/// A ray, as box tests take it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slabs {
+    origin: DVec3,
+    /// Of the direction, times a power of two that makes its greatest component 1 to 2.
+    inverse: DVec3,
+    /// In lengths of that.
+    t_min: f64,
+    t_max: f64,
+    pad: f64,
+}
+
+impl Slabs {
+    pub(super) fn new(origin: [f64; 3], direction: [f64; 3], t_min: f64, t_max: f64) -> Self {
+        let scaled = Scaled::of(direction);
+        let inverse = (1.0 / scaled.direction).clamp(DVec3::splat(-MOST_INVERSE), DVec3::splat(MOST_INVERSE));
+        let [t_min, t_max] = [t_min, t_max].map(|t| scaled.scaled(t));
+        let origin = DVec3::from_array(origin);
+        Self { origin, inverse, t_min, t_max, pad: MARGIN * origin.abs().max_element() }
+    }
+}
+
+impl Meets for Slabs {
+    #[inline(always)]
+    fn meets<const N: usize>(&self, boxes: &Boxes<N>) -> u32 {
+        let pad = boxes.pad.max(self.pad);
+        let (mut near, mut far) = ([self.t_min; N], [self.t_max; N]);
+        for k in 0..3 {
+            let (o, inverse) = (self.origin[k], self.inverse[k]);
+            let (first, last) =
+                if inverse < 0.0 { (&boxes.max[k], &boxes.min[k]) } else { (&boxes.min[k], &boxes.max[k]) };
+            let pad = if inverse < 0.0 { -pad } else { pad };
+            for i in 0..N {
+                near[i] = near[i].max((first[i] - pad - o) * inverse);
+                far[i] = far[i].min((last[i] + pad - o) * inverse);
+            }
+        }
+        (0..N).fold(0, |mask, i| mask | u32::from(near[i] <= far[i]) << i)
+    }
+}
+
+/// The binary top level.
+pub(super) struct Top<'a> {
+    nodes: &'a [TopNode2],
+    /// Of the children of each node; of a leaf twice its own.
+    boxes: Vec<Boxes<2>>,
+}
+
+impl<'a> Top<'a> {
+    pub(super) fn new(resident: &'a Resident) -> Self {
+        let step = f64::from(resident.objects[0].step_log2).exp2();
+        let nodes = &resident.top2;
+        let boxes = |node: &TopNode2| {
+            let of = match node.right {
+                TOP_LEAF => [node; 2],
+                right => [node.left, right].map(|child| &nodes[child as usize]),
+            };
+            let min = std::array::from_fn(|k| of.map(|node| node.min[k] as f64 * step));
+            let max = std::array::from_fn(|k| of.map(|node| node.max[k] as f64 * step));
+            Boxes { min, max, pad: MARGIN * reach(&min).max(reach(&max)) }
+        };
+        Self { nodes, boxes: nodes.iter().map(boxes).collect() }
+    }
+
+    /// Whether there is nothing.
+    pub(super) fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// The boxes of a node's children; of a leaf twice its own.
+    pub(super) fn boxes(&self, node: u32) -> &Boxes<2> {
+        &self.boxes[node as usize]
+    }
+
+    /// The leaf that a node is, or its children.
+    pub(super) fn below(&self, node: u32) -> Result<u32, [u32; 2]> {
+        let TopNode2 { left, right, .. } = self.nodes[node as usize];
+        if right == TOP_LEAF { Ok(left) } else { Err([left, right]) }
+    }
+
+    /// Of each node, whether there is a leaf below it for which `has` holds.
+    pub(super) fn marked(&self, has: impl Fn(u32) -> bool) -> Vec<bool> {
+        let mut marks = vec![false; self.nodes.len()];
+        // Children follow their parent.
+        for node in (0..self.nodes.len() as u32).rev() {
+            marks[node as usize] = match self.below(node) {
+                Ok(leaf) => has(leaf),
+                Err(children) => children.iter().any(|&child| marks[child as usize]),
+            };
+        }
+        marks
+    }
+
+    /// Calls `visit` for the leaves below marked nodes whose boxes, and those above them, `what` may meet. `open` is
+    /// room to work in.
+    pub(super) fn leaves(&self, marks: &[bool], what: &impl Meets, open: &mut Vec<u32>, mut visit: impl FnMut(u32)) {
+        open.clear();
+        if marks.first() == Some(&true) {
+            open.push(0);
+        }
+        while let Some(node) = open.pop() {
+            let met = what.meets(self.boxes(node));
+            match self.below(node) {
+                Ok(leaf) if met != 0 => visit(leaf),
+                Ok(_) => (),
+                Err(children) => {
+                    for (side, child) in children.into_iter().enumerate() {
+                        if met & 1 << side != 0 && marks[child as usize] {
+                            open.push(child);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The greatest of coordinates.
+fn reach<const N: usize>(axes: &[[f64; N]; 3]) -> f64 {
+    axes.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()))
+}
+
+/// A brick where an instance has it.
+pub(super) struct Placed<'a> {
+    view: BrickView<'a>,
+    /// Global id of the instance's triangle 0.
+    base: u32,
+    /// Of the brick, in the object's units.
+    origin: DVec3,
+    /// Object units of a device unit.
+    unit: f64,
+    /// By how much its boxes are grown.
+    pad: f64,
+    /// `None`: the world's own.
+    matrix: Option<&'a [f64; 12]>,
+    /// -1 where the instance is a mirror image, else 1.
+    pub(super) handedness: i32,
+}
+
+impl<'a> Placed<'a> {
+    /// A leaf of the top level, of whose brick `geometry` is.
+    pub(super) fn new(resident: &'a Resident, leaf: u32, geometry: &'a [u8]) -> Self {
+        let leaf = resident.leaves[leaf as usize];
+        let (brick, instance): (&Brick, &Instance) =
+            (&resident.bricks[leaf.brick as usize], &resident.instances[leaf.instance as usize]);
+        let object = &resident.objects[brick.object as usize];
+        let [step, unit] = [object.step_log2, object.unit_log2].map(|log2| f64::from(log2).exp2());
+        let view = BrickView::new(brick, geometry, &[]);
+        let matrix = (instance.flags & INSTANCE_IDENTITY == 0).then_some(&instance.world_from_object);
+        let far = |k: usize| (brick.min[k].unsigned_abs().max(brick.max[k].unsigned_abs())) as f64 * step;
+        let terms =
+            |m: &[f64; 12], k: usize| (0..3).map(|j| m[4 * k + j].abs() * far(j)).sum::<f64>() + m[4 * k + 3].abs();
+        // What the rows of a matrix add up is rounded by its terms, not by their sum.
+        let reach = (0..3).map(|k| matrix.map_or_else(|| far(k), |m| terms(m, k))).fold(0.0, f64::max);
+        Self {
+            view,
+            base: instance.base,
+            origin: DVec3::from_array(brick.origin.map(|x| x as f64)) * step,
+            unit,
+            pad: MARGIN * reach,
+            matrix,
+            handedness: if instance.flags & INSTANCE_MIRRORED != 0 { -1 } else { 1 },
+        }
+    }
+
+    /// The global id of a triangle.
+    pub(super) fn id(&self, triangle: u32) -> u32 {
+        self.base.wrapping_add(self.view.ids[triangle as usize])
+    }
+
+    /// The vertices of a triangle as they are stored, world units. Triangles of an instance that share a vertex have
+    /// the same numbers for it, whatever brick they lie in.
+    #[inline(always)]
+    pub(super) fn vertices(&self, triangle: u32) -> [DVec3; 3] {
+        let [a, b, c] = self.view.corners(triangle);
+        let at = |corner: [f64; 3]| self.world(self.origin + DVec3::from_array(corner) * self.unit);
+        [at(a), at(b), at(c)]
+    }
+
+    #[inline(always)]
+    fn world(&self, p: DVec3) -> DVec3 {
+        let Some(m) = self.matrix else { return p };
+        let row = |k: usize| m[4 * k] * p.x + m[4 * k + 1] * p.y + m[4 * k + 2] * p.z + m[4 * k + 3];
+        DVec3::new(row(0), row(1), row(2))
+    }
+
+    /// The world's boxes of what the children of a node hold.
+    #[inline(always)]
+    fn boxes(&self, node: &Node) -> Boxes<8> {
+        let scale = |k: usize| f64::from_bits((u64::from(node.exponent[k]) + 1023 - 127) << 52) * self.unit;
+        let grid = |bounds: &[[u8; 8]; 3]| -> [[f64; 8]; 3] {
+            std::array::from_fn(|k| {
+                let (origin, scale) = (self.origin[k] + f64::from(node.origin[k]) * self.unit, scale(k));
+                bounds[k].map(|q| origin + f64::from(q) * scale)
+            })
+        };
+        let (min, max) = (grid(&node.lo), grid(&node.hi));
+        let Some(m) = self.matrix else { return Boxes { min, max, pad: self.pad } };
+        let mut own = Boxes { min, max, pad: self.pad };
+        for k in 0..3 {
+            let row = [m[4 * k], m[4 * k + 1], m[4 * k + 2]];
+            for i in 0..8 {
+                let (mut low, mut high) = (m[4 * k + 3], m[4 * k + 3]);
+                for (j, r) in row.into_iter().enumerate() {
+                    let (a, b) = (r * min[j][i], r * max[j][i]);
+                    (low, high) = (low + a.min(b), high + a.max(b));
+                }
+                (own.min[k][i], own.max[k][i]) = (low, high);
+            }
+        }
+        own
+    }
+
+    /// Calls `visit` for every triangle of leaves whose boxes, and those above them, `what` may meet; false ends it.
+    /// `open` is room to work in.
+    #[inline(always)]
+    pub(super) fn walk(&self, what: &impl Meets, open: &mut Vec<u32>, mut visit: impl FnMut(u32) -> bool) {
+        open.clear();
+        open.push(0);
+        while let Some(index) = open.pop() {
+            let node = &self.view.nodes[index as usize];
+            let mut met = what.meets(&self.boxes(node)) & children(node);
+            while met != 0 {
+                let slot = met.trailing_zeros() as usize;
+                met &= met - 1;
+                match child(node, slot) {
+                    Child::Node(index) => open.push(index),
+                    Child::Triangles(first, count) => {
+                        if !(first..first + count).all(&mut visit) {
+                            return;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Calls `visit` for the triangles of leaves no farther from `point` than `visit` last said, squared, nearer nodes
+    /// first. `open` is room to work in.
+    #[inline(always)]
+    pub(super) fn walk_near(
+        &self,
+        point: DVec3,
+        mut within: f64,
+        open: &mut Vec<(f64, Child)>,
+        mut visit: impl FnMut(u32) -> f64,
+    ) {
+        open.clear();
+        open.push((0.0, Child::Node(0)));
+        while let Some((distance, next)) = open.pop() {
+            if distance > within {
+                continue;
+            }
+            let index = match next {
+                Child::Node(index) => index,
+                Child::Triangles(first, count) => {
+                    within = (first..first + count).fold(within, |within, triangle| visit(triangle).min(within));
+                    continue;
+                }
+            };
+            let node = &self.view.nodes[index as usize];
+            let before = open.len();
+            let distances = self.boxes(node).distances_squared(point);
+            let mut left = children(node);
+            while left != 0 {
+                let slot = left.trailing_zeros() as usize;
+                left &= left - 1;
+                if distances[slot] <= within {
+                    open.push((distances[slot], child(node, slot)));
+                }
+            }
+            // The nearest last, on top.
+            open[before..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        }
+    }
+}
+
+/// What a child of a node is: a node, or the first and the number of its triangles.
+#[derive(Clone, Copy)]
+pub(super) enum Child {
+    Node(u32),
+    Triangles(u32, u32),
+}
+
+/// The slots of a node that have a child, a bit each.
+#[inline(always)]
+fn children(node: &Node) -> u32 {
+    (0..8).fold(0, |mask, slot| mask | u32::from(node.meta[slot] != 0) << slot)
+}
+
+#[inline(always)]
+fn child(node: &Node, slot: usize) -> Child {
+    if node.inner_mask & 1 << slot != 0 {
+        return Child::Node(node.child_base + inner_before(u32::from(node.inner_mask), slot as u32));
+    }
+    let what = u32::from(node.meta[slot]);
+    Child::Triangles(node.triangle_base + (what & 31), (what >> 5).count_ones())
+}

@@ -1,0 +1,105 @@
+//! Payloads of bricks in host memory: each is read and checked by workers, and stays while there is room.
+
+use crate::stream::{Destination, HostCache, Item, Workers};
+use anyhow::{Result, anyhow};
+use bricks::SceneFile;
+use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Least bytes that payloads in use may take together, whatever the budget.
+const LEAST_BATCH: u64 = 4 << 20;
+
+/// A payload that a worker brings.
+#[derive(Default)]
+struct Held(Option<Arc<[u8]>>);
+
+impl Destination for Held {
+    const SHARES: bool = true;
+
+    fn fill(&mut self, bytes: &[u8]) {
+        self.share(Arc::from(bytes));
+    }
+
+    fn share(&mut self, payload: Arc<[u8]>) {
+        self.0 = Some(payload);
+    }
+}
+
+/// Payloads of a scene, through a cache.
+pub(super) struct Store {
+    scene: Arc<SceneFile>,
+    workers: Workers,
+    /// Bytes of payloads that are in use at a time.
+    batch_bytes: u64,
+    /// Bytes that the cache keeps.
+    kept_bytes: u64,
+    most: AtomicU64,
+}
+
+impl Store {
+    /// A store of at most `bytes`, of which a quarter is for what is in use; `threads` read.
+    pub(super) fn new(scene: Arc<SceneFile>, bytes: u64, threads: usize) -> Result<Self> {
+        let batch_bytes = (bytes / 4).max(LEAST_BATCH);
+        let kept_bytes = bytes.saturating_sub(batch_bytes);
+        let workers = Workers::new(scene.clone(), HostCache::new(kept_bytes), threads)?;
+        Ok(Self { scene, workers, batch_bytes, kept_bytes, most: AtomicU64::new(0) })
+    }
+
+    fn bytes(&self, item: Item) -> u64 {
+        self.scene.loaded_bytes(item.into())
+    }
+
+    /// Bricks by runs whose geometry the cache keeps together, in the order of the file.
+    pub(super) fn runs(&self) -> Vec<Range<u32>> {
+        let count = self.scene.resident().exact_bricks() as u32;
+        let room = self.kept_bytes.max(self.batch_bytes);
+        let (mut runs, mut first, mut sum) = (Vec::new(), 0, 0);
+        for brick in 0..count {
+            let bytes = self.bytes(Item::geometry(brick));
+            if sum + bytes > room && brick > first {
+                runs.push(first..brick);
+                (first, sum) = (brick, 0);
+            }
+            sum += bytes;
+        }
+        if first < count {
+            runs.push(first..count);
+        }
+        runs
+    }
+
+    /// Calls `visit` with the place of each of `items` and its payload: as many at a time as may be in use, which are
+    /// there together.
+    ///
+    /// # Errors
+    /// A damaged payload, by its name; what `visit` says.
+    pub(super) fn for_each(
+        &self,
+        items: &[Item],
+        mut visit: impl FnMut(usize, &[Arc<[u8]>]) -> Result<()>,
+    ) -> Result<()> {
+        let mut first = 0;
+        while first < items.len() {
+            let (mut end, mut sum) = (first, 0);
+            while end < items.len() && (end == first || sum + self.bytes(items[end]) <= self.batch_bytes) {
+                sum += self.bytes(items[end]);
+                end += 1;
+            }
+            let requests = items[first..end].iter().map(|&item| (item, Held::default())).collect();
+            let loaded = self.workers.load(requests)?;
+            let held = loaded.into_iter().map(|(item, held)| held.0.ok_or_else(|| anyhow!("{item}: no payload")));
+            let held = held.collect::<Result<Vec<_>>>()?;
+            self.most.fetch_max(sum + self.workers.host_cache().stats().used_bytes, Ordering::Relaxed);
+            visit(first, &held)?;
+            first = end;
+        }
+        Ok(())
+    }
+
+    /// Payloads and bytes read from the file so far, and most bytes that were held.
+    pub(super) fn read(&self) -> (u64, u64, u64) {
+        let stats = self.workers.stats();
+        (stats.read, stats.read_bytes, self.most.load(Ordering::Relaxed))
+    }
+}

@@ -1,0 +1,315 @@
+//! Queries against brute force over the triangles as truth decodes them, and against closed forms.
+
+use super::*;
+use crate::math::crossing::crossing;
+use crate::math::random::Rng;
+use crate::output::npy::Ray;
+use crate::reference::{Truth, TruthRay};
+use bricks::SceneFile;
+use brickwalk_convert::build::{BuildSettings, LatticeStep, build};
+use brickwalk_convert::progress::Progress;
+use brickwalk_convert::source::{Mesh, Placement, Primitive, SourceScene};
+use glam::DVec3;
+use std::f64::consts::PI;
+
+const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+/// Turned about y and scaled; mirrored; far away and sheared.
+const PLACES: [[f64; 12]; 3] = [
+    [1.2, 0.0, 1.6, 10.0, 0.0, 2.0, 0.0, 0.5, -1.6, 0.0, 1.2, 2.0],
+    [1.0, 0.0, 0.0, -7.0, 0.0, 1.0, 0.0, 0.25, 0.0, 0.0, -1.0, 4.0],
+    [1.0, 0.25, 0.0, 500.0, 0.0, 2.0, 0.0, -300.0, 0.5, 0.0, 1.0, 20.0],
+];
+
+/// Middles of the spheres but for the one far away.
+const CENTERS: [DVec3; 3] = [DVec3::ZERO, DVec3::new(10.0, 0.5, 2.0), DVec3::new(-7.0, 0.25, 4.0)];
+
+/// A sphere of radius 1 of `n` rings, closed and seen from outside counter-clockwise. The first vertex of a triangle is
+/// any corner. `without` leaves out so many triangles.
+fn sphere(n: u32, without: usize) -> Mesh {
+    let m = 2 * n;
+    let mut positions = vec![[0.0, 1.0, 0.0]];
+    for (ring, k) in (1..n).flat_map(|ring| (0..m).map(move |k| (ring, k))) {
+        let (theta, phi) = (PI * f64::from(ring) / f64::from(n), 2.0 * PI * f64::from(k) / f64::from(m));
+        positions.push([theta.sin() * phi.cos(), theta.cos(), -theta.sin() * phi.sin()]);
+    }
+    positions.push([0.0, -1.0, 0.0]);
+    let at = |ring: u32, k: u32| 1 + (ring - 1) * m + k % m;
+    let last = positions.len() as u32 - 1;
+    let mut triangles = Vec::new();
+    for k in 0..m {
+        triangles.push([0, at(1, k), at(1, k + 1)]);
+        triangles.push([at(n - 1, k + 1), at(n - 1, k), last]);
+        for ring in 1..n - 1 {
+            let [a, b, c, d] = [at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1)];
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    for (number, triangle) in triangles.iter_mut().enumerate() {
+        triangle.rotate_left(number % 3);
+    }
+    let kept = triangles.len() - without;
+    let indices = triangles.into_iter().take(kept).flatten().collect();
+    let primitive = Primitive { material: 0, positions, indices, ..Primitive::default() };
+    Mesh { name: "sphere".into(), primitives: vec![primitive] }
+}
+
+/// Spheres: one baked into the world, others placed.
+fn spheres(places: &[[f64; 12]], without: usize) -> SourceScene {
+    let place = |matrix: &[f64; 12]| Placement { mesh: 0, world_from_mesh: *matrix, ..Placement::default() };
+    SourceScene {
+        meshes: vec![sphere(24, without)],
+        placements: places.iter().map(place).collect(),
+        materials: vec![bricks::Material::DIFFUSE],
+        sources: vec![bricks::Source { name: "spheres".into(), bytes: 0, hash: "2d06800538d394c2".into() }],
+        ..SourceScene::default()
+    }
+}
+
+fn convert(source: SourceScene, brick_triangles: u32) -> (tempfile::TempDir, Arc<SceneFile>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.bricks");
+    let settings = BuildSettings {
+        brick_triangles,
+        threads: Some(1),
+        lattice: Some(LatticeStep::Log2(-20)),
+        instance_min_triangles: 1,
+        ..BuildSettings::default()
+    };
+    build(source, &settings, &path, &Progress::hidden()).unwrap();
+    let file = Arc::new(SceneFile::open(path).unwrap());
+    (folder, file)
+}
+
+/// A point of the unit ball.
+fn in_ball(rng: &mut Rng) -> DVec3 {
+    loop {
+        let point = DVec3::from_array([0; 3].map(|_| f64::from(rng.signed())));
+        if point.length() <= 1.0 {
+            return point;
+        }
+    }
+}
+
+fn all_spheres() -> SourceScene {
+    let places: Vec<[f64; 12]> = [IDENTITY].into_iter().chain(PLACES).collect();
+    spheres(&places, 0)
+}
+
+/// Rays from about the spheres to about them; some along axes, some that end early or begin late.
+fn rays(count: usize) -> Vec<Ray> {
+    let mut rng = Rng(7);
+    let mut point = |spread: f64| CENTERS[rng.below(3) as usize] + spread * in_ball(&mut rng);
+    let mut rays: Vec<Ray> = (0..count)
+        .map(|i| {
+            let (from, to) = (point(6.0), point(1.0));
+            let (t_min, t_max) = [(0.0, f64::INFINITY), (0.25, 1.0), (0.0, 0.5), (-3.0, 4.0)][i % 4];
+            Ray { origin: from.to_array(), direction: (to - from).to_array(), t_min, t_max }
+        })
+        .collect();
+    // Through poles and along meridians, where vertices and edges are met exactly.
+    for (origin, direction) in [([0.0, 5.0, 0.0], [0.0, -1.0, 0.0]), ([-4.0, 0.0, 0.0], [1.0, 0.0, 0.0])] {
+        rays.push(Ray { origin, direction, t_min: 0.0, t_max: f64::INFINITY });
+    }
+    rays
+}
+
+fn brute(truth: &Truth, ray: &Ray) -> Vec<(f64, u32)> {
+    let line = TruthRay::new(ray.origin, ray.direction, 0.0, 0.0).line();
+    let met = |id| Some((crossing(&line, truth.vertices(id)?)?.t, id));
+    let within = |&(t, _): &(f64, u32)| t >= ray.t_min.max(0.0) && t <= ray.t_max;
+    let mut all: Vec<(f64, u32)> = truth.ids().filter_map(met).filter(within).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    all
+}
+
+#[test]
+fn all_that_rays_meet_is_what_brute_force_finds() {
+    let rays = rays(600);
+    let mut lists = Vec::new();
+    for (brick_triangles, cache) in [(1 << 14, 64 << 20), (128, 64 << 20), (128, 0)] {
+        let (_folder, file) = convert(all_spheres(), brick_triangles);
+        let truth = Truth::load(&file).unwrap();
+        let queries = Queries::new(file, cache, 2).unwrap();
+        let found = queries.list_intersections(&rays, &mut |_| Ok(())).unwrap();
+        let counts = queries.count_intersections(&rays, &mut |_| Ok(())).unwrap();
+        for (number, ray) in rays.iter().enumerate() {
+            let own = &found.hits[found.starts[number] as usize..found.starts[number + 1] as usize];
+            let truth_of_all = brute(&truth, ray);
+            let ids: Vec<(f64, u32)> = own.iter().map(|hit| (hit.t, hit.triangle)).collect();
+            assert_eq!(ids, truth_of_all, "ray {number}");
+            assert_eq!(counts[number] as usize, truth_of_all.len());
+            let closest = truth.closest(&TruthRay::new(ray.origin, ray.direction, ray.t_min.max(0.0), ray.t_max));
+            let first = own.first().map(|hit| (hit.t, [hit.u, hit.v]));
+            assert_eq!(first.map(|f| f.0), closest.map(|hit| hit.t));
+            if let (Some((_, [u, v])), Some(truth)) = (first, closest.filter(|truth| truth.id == own[0].triangle)) {
+                assert!((f64::from(u) - truth.u).abs() < 1e-6 && (f64::from(v) - truth.v).abs() < 1e-6, "ray {number}");
+            }
+        }
+        lists.push(found);
+    }
+    assert!(lists.windows(2).all(|pair| pair[0] == pair[1]), "bricks and caches do not show");
+    assert!(lists[0].hits.len() > 600, "{}", lists[0].hits.len());
+    let most = lists[0].starts.windows(2).map(|pair| pair[1] - pair[0]).max();
+    assert!(most > Some(20), "the pole is met: {most:?}");
+}
+
+/// The nearest point of a triangle by regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
+fn nearest_by_regions(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
+    let (ab, ac) = (b - a, c - a);
+    let (d1, d2) = (ab.dot(p - a), ac.dot(p - a));
+    let (d3, d4) = (ab.dot(p - b), ac.dot(p - b));
+    let (d5, d6) = (ab.dot(p - c), ac.dot(p - c));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a;
+    } else if d3 >= 0.0 && d4 <= d3 {
+        return b;
+    } else if d6 >= 0.0 && d5 <= d6 {
+        return c;
+    }
+    let (va, vb, vc) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        a + ab * (d1 / (d1 - d3))
+    } else if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        a + ac * (d2 / (d2 - d6))
+    } else if va <= 0.0 && d4 >= d3 && d5 >= d6 {
+        b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))
+    } else {
+        a + (ab * vb + ac * vc) / (va + vb + vc)
+    }
+}
+
+fn points(count: usize) -> Vec<[f64; 3]> {
+    let mut rng = Rng(3);
+    let point = |i: usize| (CENTERS[i % 3] + [0.9, 1.1, 4.0, 300.0][i % 4] * in_ball(&mut rng)).to_array();
+    let mut all: Vec<[f64; 3]> = (0..count).map(point).collect();
+    all.extend([[0.0; 3], [0.0, 1.0, 0.0], [1e9, 0.0, 0.0]]);
+    all
+}
+
+#[test]
+fn the_nearest_point_is_what_brute_force_finds() {
+    let points = points(300);
+    let mut all = Vec::new();
+    for (brick_triangles, cache) in [(1 << 14, 64 << 20), (128, 0)] {
+        let (_folder, file) = convert(all_spheres(), brick_triangles);
+        let truth = Truth::load(&file).unwrap();
+        let queries = Queries::new(file, cache, 2).unwrap();
+        let found = queries.closest_points(&points, &mut |_| Ok(())).unwrap();
+        for (point, found) in points.iter().zip(&found) {
+            let p = DVec3::from_array(*point);
+            let of = |id| truth.vertices(id).unwrap().map(DVec3::from_array);
+            let near = |id: u32| (nearest_by_regions(p, of(id)) - p).length();
+            let least = truth.ids().map(near).fold(f64::INFINITY, f64::min);
+            let error = 1e-12 * (1.0 + p.abs().max_element());
+            assert!((found.distance - least).abs() < error, "{point:?}: {} {least}", found.distance);
+            assert!((near(found.triangle) - least).abs() < error, "the triangle is that of the point");
+            let at = DVec3::from_array(found.point);
+            assert!(
+                ((at - p).length() - least).abs() < error
+                    && (nearest_by_regions(at, of(found.triangle)) - at).length() < error
+            );
+        }
+        all.push(found);
+    }
+    for (a, b) in all[0].iter().zip(&all[1]) {
+        assert_eq!((a.point, a.distance, a.triangle, a.u, a.v), (b.point, b.distance, b.triangle, b.u, b.v));
+    }
+    // The control: of other points it is something else.
+    assert_ne!(all[0][0].distance, all[0][1].distance);
+}
+
+#[test]
+fn points_inside_are_those_of_the_spheres() {
+    let (_folder, file) = convert(all_spheres(), 128);
+    let queries = Queries::new(file, 0, 2).unwrap();
+    assert!(queries.surfaces().unwrap().iter().all(|surface| surface.is_turned));
+    let points = points(3000);
+    let inside = queries.occupancy(&points, false, &mut |_| Ok(())).unwrap();
+    let signed = queries.signed_distance(&points, false, &mut |_| Ok(())).unwrap();
+    let matrices: Vec<glam::DAffine3> = [IDENTITY].iter().chain(&PLACES).map(crate::scene::placement::affine).collect();
+    let (mut told, mut full) = (0, 0);
+    for ((point, inside), signed) in points.iter().zip(inside).zip(signed) {
+        // Of the least sphere, in radii: the mesh lies between cos² (π/48) and 1.
+        let radius = |m: &glam::DAffine3| m.inverse().transform_point3(DVec3::from_array(*point)).length();
+        let least = matrices.iter().map(radius).fold(f64::INFINITY, f64::min);
+        if !(0.99..=1.001).contains(&least) {
+            assert_eq!(inside, least < 1.0, "{point:?}");
+            assert_eq!(signed < 0.0, inside);
+            told += 1;
+            full += u32::from(inside);
+        }
+    }
+    assert!(told > 2900 && full > 500, "{told} {full}");
+    // About the first sphere the distance is known.
+    let signed = queries.signed_distance(&[[0.0, 0.5, 0.0], [0.0, 3.0, 0.0]], false, &mut |_| Ok(())).unwrap();
+    assert!((signed[0] + 0.5).abs() < 0.005 && (signed[1] - 2.0).abs() < 1e-6, "{signed:?}");
+}
+
+#[test]
+fn open_surfaces_have_no_inside() {
+    let (_folder, file) = convert(spheres(&[IDENTITY], 1), 128);
+    let queries = Queries::new(file, 0, 1).unwrap();
+    assert!(!queries.surfaces().unwrap()[0].is_closed);
+    let error = queries.occupancy(&[[0.0; 3]], false, &mut |_| Ok(())).unwrap_err().to_string();
+    assert!(error.contains("scene.bricks: its surface is not closed"), "{error}");
+    assert!(queries.occupancy(&[[0.0; 3]], true, &mut |_| Ok(())).is_ok());
+}
+
+#[test]
+fn what_lies_between_hides() {
+    let (_folder, file) = convert(spheres(&[IDENTITY], 0), 128);
+    let queries = Queries::new(file.clone(), 0, 2).unwrap();
+    let from = [[-3.0, 0.1, 0.2], [-3.0, 0.1, 0.2], [-3.0, 2.0, 0.0], [-3.0, 0.1, 0.2], [0.0, 0.0, 0.0]];
+    let to = [[3.0, 0.1, 0.2], [-2.0, 0.1, 0.2], [3.0, 2.0, 0.0], [-3.0, 0.1, 0.2], [0.5, 0.0, 0.0]];
+    let free = queries.visibility(&from, &to, &mut |_| Ok(())).unwrap();
+    assert_eq!(free, [false, true, true, true, true]);
+    // Points of the surface see what is above them, also when rounded to f32, and nothing beyond.
+    let above: Vec<[f64; 3]> = points(200).into_iter().filter(|p| DVec3::from_array(*p).length() > 1.5).collect();
+    let on = queries.closest_points(&above, &mut |_| Ok(())).unwrap();
+    let rounded: Vec<[f64; 3]> = on.iter().map(|on| on.point.map(|x| f64::from(x as f32))).collect();
+    assert!(queries.visibility(&rounded, &above, &mut |_| Ok(())).unwrap().iter().all(|&free| free));
+    let beyond: Vec<[f64; 3]> = above.iter().map(|p| p.map(|x| -x)).collect();
+    assert!(queries.visibility(&rounded, &beyond, &mut |_| Ok(())).unwrap().iter().all(|&free| !free));
+}
+
+#[test]
+fn bad_input_is_named_and_work_can_be_stopped() {
+    let (_folder, file) = convert(spheres(&[IDENTITY], 0), 128);
+    let queries = Queries::new(file, 0, 1).unwrap();
+    let text = |error: anyhow::Error| format!("{error:#}");
+    let error = queries.closest_points(&[[0.0; 3], [0.0, f64::NAN, 0.0]], &mut |_| Ok(())).unwrap_err();
+    assert!(text(error).starts_with("point 1: [0.0, NaN, 0.0] is not finite"));
+    let ray = Ray { origin: [0.0; 3], direction: [0.0; 3], t_min: 0.0, t_max: 1.0 };
+    let error = queries.count_intersections(&[ray], &mut |_| Ok(())).unwrap_err();
+    assert_eq!(text(error), "ray 0: the direction has no length");
+    assert!(queries.visibility(&[[0.0; 3]], &[], &mut |_| Ok(())).is_err());
+    let stop = || -> Box<Watch> { Box::new(|_| anyhow::bail!("enough")) };
+    let rays = rays(100);
+    assert_eq!(text(queries.list_intersections(&rays, &mut *stop()).unwrap_err()), "enough");
+    assert_eq!(text(queries.closest_points(&points(10), &mut *stop()).unwrap_err()), "enough");
+    let mut told = 0;
+    let mut count = |done: u64| {
+        told += done;
+        Ok(())
+    };
+    queries.count_intersections(&rays, &mut count).unwrap();
+    queries.closest_points(&points(10), &mut count).unwrap();
+    queries.signed_distance(&points(10), false, &mut count).unwrap();
+    assert_eq!(told, (rays.len() + 2 * points(10).len()) as u64, "all items are told");
+}
+
+#[test]
+fn nothing_is_asked_for_twice_and_an_empty_scene_answers() {
+    let (_folder, file) = convert(all_spheres(), 64);
+    let bricks = file.resident().exact_bricks() as u64;
+    let queries = Queries::new(file, 64 << 20, 2).unwrap();
+    queries.count_intersections(&rays(400), &mut |_| Ok(())).unwrap();
+    let read = queries.stats().payloads_read;
+    assert!(read > bricks / 2 && read <= bricks, "{read} of {bricks}");
+    let (_folder, file) = convert(SourceScene { meshes: vec![], placements: vec![], ..all_spheres() }, 64);
+    let queries = Queries::new(file, 0, 1).unwrap();
+    let ray = Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0], t_min: 0.0, t_max: 1.0 };
+    assert_eq!(queries.count_intersections(&[ray], &mut |_| Ok(())).unwrap(), [0]);
+    assert_eq!(queries.closest_points(&[[0.0; 3]], &mut |_| Ok(())).unwrap()[0].distance, f64::INFINITY);
+    assert_eq!(queries.occupancy(&[[0.0; 3]], false, &mut |_| Ok(())).unwrap(), [false]);
+}
