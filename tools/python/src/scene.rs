@@ -1,0 +1,401 @@
+//! A scene as the package sees it: its facts, rays, pictures.
+
+use crate::errors::{exception, failed, wrong};
+use crate::held::{self, Done, Held, Options, Shared};
+use crate::query;
+use crate::render;
+use crate::rows::{Named, Rows};
+use crate::worker::{Desk, Progress, Task, Worker, run_alone};
+use anyhow::Result;
+use bricks::SceneFile;
+use brickwalk::counters::Counters;
+use brickwalk::session::{Hit, Ray};
+use brickwalk::settings::{Adapter, CacheSize};
+use brickwalk::stream::PayloadSource;
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Rows of a job, at least and at most: from a dispatch of rays on.
+type Batches = (usize, usize);
+const DISPATCHES: Batches = (1 << 16, 1 << 20);
+/// Of queries, which bring what they are given into the order of bricks: the more at once, the less is read twice.
+const WHOLE: Batches = (1 << 22, 1 << 22);
+/// Jobs that take less become larger, and those that take four times as long smaller.
+const SHORT: Duration = Duration::from_millis(250);
+
+/// A scene that is open. Threads may share it: their jobs are done in turn.
+#[pyclass(frozen, module = "brickwalk._brickwalk")]
+pub struct Core {
+    options: Options,
+    scene: Arc<SceneFile>,
+    done: Shared,
+    /// `None`: it is closed.
+    worker: Mutex<Option<Worker<Held>>>,
+}
+
+/// Refuses rows that are not what they should be.
+type Check<'py> = fn(&Rows<'py>, Python<'py>, &Named) -> PyResult<()>;
+/// Reads some of the rows.
+type Read<'py, R> = fn(&Rows<'py>, Range<usize>) -> PyResult<Vec<R>>;
+
+/// What becomes of rows.
+struct Job<'py, 'a, R> {
+    rows: Rows<'py>,
+    named: Named,
+    progress: Told<'py>,
+    check: Check<'py>,
+    read: Read<'py, R>,
+    core: &'a Core,
+    batches: Batches,
+}
+
+impl<'py, R: Send + 'static> Job<'py, '_, R> {
+    /// Has the scene's thread do `work` with rows, some at a time, and `take` what it returns of those from a row on.
+    fn run<T: Send + 'static>(
+        self,
+        py: Python<'py>,
+        work: impl Fn(&mut Held, &[R], &Task) -> Result<T> + Copy + Send + 'static,
+        mut take: impl FnMut(usize, T) -> PyResult<()>,
+    ) -> PyResult<()> {
+        let desk = self.core.desk()?;
+        (self.check)(&self.rows, py, &self.named)?;
+        let (count, _) = self.rows.shape();
+        let mut progress = Progress::new(self.progress, count as u64);
+        let (least, largest) = self.batches;
+        let (mut start, mut most) = (0, least);
+        while start < count {
+            let end = count.min(start + most);
+            let given = (self.read)(&self.rows, start..end)?;
+            let clock = Instant::now();
+            take(start, desk.run(py, &mut progress, move |held, task| work(held, &given, task))?)?;
+            let time = clock.elapsed();
+            if time < SHORT {
+                most = (2 * most).min(largest);
+            } else if time > 4 * SHORT {
+                most = (most / 2).max(least);
+            }
+            progress.reached(end as u64)?;
+            start = end;
+        }
+        Ok(())
+    }
+}
+
+impl Core {
+    /// A way to hand its thread jobs. In a forked process the thread is started anew.
+    pub fn desk(&self) -> PyResult<Desk<Held>> {
+        let mut worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*worker {
+            None => Err(wrong("the scene is closed")),
+            Some(running) if !running.is_lost() => Ok(running.desk()),
+            Some(_) => {
+                let anew = start(&self.options, &self.scene, &self.done)?;
+                let desk = anew.desk();
+                // What the other process had open is left as it is: there is no thread that could close it.
+                std::mem::forget(worker.replace(anew));
+                Ok(desk)
+            }
+        }
+    }
+
+    fn rays<'py>(
+        &self,
+        rows: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        progress: Told<'py>,
+    ) -> PyResult<Job<'py, '_, Ray>> {
+        let (rows, named) = (Rows::of(rows)?, Named { name: "ray", shape });
+        let (check, read): (Check<'py>, Read<'py, Ray>) = (Rows::check_rays, Rows::rays);
+        Ok(Job { rows, named, progress, check, read, core: self, batches: DISPATCHES })
+    }
+
+    fn points<'py>(
+        &self,
+        rows: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        progress: Told<'py>,
+    ) -> PyResult<Job<'py, '_, [f64; 3]>> {
+        let (rows, named) = (Rows::of(rows)?, Named { name: "point", shape });
+        let (check, read): (Check<'py>, Read<'py, [f64; 3]>) = (Rows::check_points, Rows::points);
+        Ok(Job { rows, named, progress, check, read, core: self, batches: WHOLE })
+    }
+}
+
+/// Who is told how far work is.
+type Told<'py> = Option<Bound<'py, PyAny>>;
+
+fn start(options: &Options, scene: &Arc<SceneFile>, done: &Shared) -> PyResult<Worker<Held>> {
+    let (options, scene, done) = (options.clone(), scene.clone(), done.clone());
+    Worker::start(move || Held::new(options, scene, done)).map_err(|error| exception(&error))
+}
+
+fn unwritable(error: impl std::fmt::Display) -> PyErr {
+    wrong(format!("out: the array cannot be written to: {error}"))
+}
+
+/// Writes `values` into an array from a position on.
+fn write<T: numpy::Element + Copy>(
+    array: &Bound<'_, PyArray1<T>>,
+    start: usize,
+    values: impl Iterator<Item = T>,
+) -> PyResult<()> {
+    let mut array = array.try_readwrite().map_err(unwritable)?;
+    let slots = array.as_slice_mut().map_err(unwritable)?.get_mut(start..).unwrap_or_default();
+    slots.iter_mut().zip(values).for_each(|(slot, value)| *slot = value);
+    Ok(())
+}
+
+/// Writes rows of `N` into an array from a row on.
+fn write_rows<T: numpy::Element + Copy, const N: usize>(
+    array: &Bound<'_, PyArray2<T>>,
+    start: usize,
+    rows: impl Iterator<Item = [T; N]>,
+) -> PyResult<()> {
+    let mut array = array.try_readwrite().map_err(unwritable)?;
+    let slots = array.as_slice_mut().map_err(unwritable)?.get_mut(start * N..).unwrap_or_default();
+    slots.chunks_exact_mut(N).zip(rows).for_each(|(slot, row)| slot.copy_from_slice(&row));
+    Ok(())
+}
+
+#[pymethods]
+impl Core {
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf, cache: &str, adapter: &str) -> PyResult<Self> {
+        let cache: CacheSize = cache.parse().map_err(|why| wrong(format!("cache {cache:?}: {why}")))?;
+        let Ok(adapter) = adapter.parse::<Adapter>();
+        let file = path.clone();
+        let open = move |_: &Arc<Task>| Ok(Arc::new(SceneFile::open(file)?));
+        let scene = run_alone(py, &mut Progress::new(None, 0), open)?;
+        let (options, done) = (Options { path, cache, adapter }, Shared::default());
+        let worker = Mutex::new(Some(start(&options, &scene, &done)?));
+        Ok(Self { options, scene, done, worker })
+    }
+
+    /// Closes the scene and its device, and waits for that.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        let worker = self.worker.lock().unwrap_or_else(PoisonError::into_inner).take();
+        worker.map_or(Ok(()), |worker| worker.finish(py))
+    }
+
+    #[getter]
+    fn closed(&self) -> bool {
+        self.worker.lock().unwrap_or_else(PoisonError::into_inner).is_none()
+    }
+
+    /// Facts of the scene.
+    fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let resident = self.scene.resident();
+        let manifest = &resident.manifest;
+        let dict = PyDict::new(py);
+        dict.set_item("path", self.options.path.as_os_str())?;
+        dict.set_item("triangles", manifest.triangles_instanced)?;
+        dict.set_item("triangles_stored", manifest.triangles_stored)?;
+        dict.set_item("triangle_ids", manifest.triangle_ids)?;
+        // The first is that of the world itself.
+        dict.set_item("instances", resident.instances.len().saturating_sub(1))?;
+        dict.set_item("bricks", resident.bricks.len())?;
+        dict.set_item("levels", resident.levels.len())?;
+        dict.set_item("materials", resident.materials.len())?;
+        dict.set_item("textures", resident.textures.len())?;
+        dict.set_item("bytes", self.scene.file_bytes())?;
+        dict.set_item("bytes_resident", self.scene.resident_bytes())?;
+        dict.set_item("bytes_bricks", self.scene.sizes().sum())?;
+        let has_bounds = (0..3).all(|k| manifest.min[k] <= manifest.max[k]);
+        let bounds =
+            has_bounds.then(|| PyArray1::from_slice(py, &[manifest.min, manifest.max].concat()).reshape([2, 3]));
+        dict.set_item("bounds", bounds.transpose()?)?;
+        dict.set_item("sources", manifest.sources.iter().map(|source| source.name.as_str()).collect::<Vec<_>>())?;
+        dict.set_item("warnings", &manifest.warnings)?;
+        Ok(dict)
+    }
+
+    /// What was done since the scene was opened.
+    fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let done = &*held::lock(&self.done);
+        let Done { traced, rendered, .. } = done;
+        let both = |of: fn(&Counters) -> u64| of(traced) + of(rendered);
+        let bytes = |c: &Counters| c.bytes_bvh + c.bytes_geometry + c.bytes_attributes + c.bytes_textures;
+        let dict = PyDict::new(py);
+        dict.set_item("rays", done.rays)?;
+        dict.set_item("occlusion_rays", done.occlusion_rays)?;
+        dict.set_item("hits", done.hits)?;
+        dict.set_item("pictures", done.pictures)?;
+        dict.set_item("bricks_loaded", both(|c| c.bricks_loaded))?;
+        dict.set_item("bricks_evicted", both(|c| c.bricks_evicted))?;
+        dict.set_item("bytes_loaded", both(bytes))?;
+        dict.set_item("round_trips", both(|c| c.round_trips))?;
+        dict.set_item("seconds", (traced.ms + rendered.ms) * 1e-3)?;
+        dict.set_item("queries", done.queries)?;
+        dict.set_item("query_payloads_read", done.queried.payloads_read)?;
+        dict.set_item("query_bytes_read", done.queried.bytes_read)?;
+        dict.set_item("query_most_bytes", done.queried.most_bytes)?;
+        dict.set_item("device", done.device.as_deref())?;
+        Ok(dict)
+    }
+
+    /// Fills arrays with the closest hits of rays.
+    #[allow(clippy::too_many_arguments)]
+    fn cast<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        t: &Bound<'py, PyArray1<f64>>,
+        triangle: &Bound<'py, PyArray1<u32>>,
+        uv: &Bound<'py, PyArray2<f32>>,
+        normal: &Bound<'py, PyArray2<f32>>,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        let cast = |held: &mut Held, rays: &[Ray], task: &Task| held.trace(rays, false, task);
+        self.rays(rays, shape, progress)?.run(py, cast, |start, hits: Vec<Hit>| {
+            if hits.iter().any(|hit| hit.t.is_nan()) {
+                return Err(failed("a hit is not a number; this is a defect of brickwalk"));
+            }
+            write(t, start, hits.iter().map(|hit| hit.t))?;
+            write(triangle, start, hits.iter().map(|hit| hit.triangle))?;
+            write_rows(uv, start, hits.iter().map(|hit| [hit.u, hit.v]))?;
+            write_rows(normal, start, hits.iter().map(|hit| hit.normal))
+        })
+    }
+
+    /// Fills an array with whether rays hit anything.
+    fn occluded<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        hit: &Bound<'py, PyArray1<bool>>,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        let any = |held: &mut Held, rays: &[Ray], task: &Task| held.trace(rays, true, task);
+        let take = |start, hits: Vec<Hit>| write(hit, start, hits.iter().map(|hit| hit.triangle != u32::MAX));
+        self.rays(rays, shape, progress)?.run(py, any, take)
+    }
+
+    /// Fills an array with how many triangles rays meet.
+    fn count<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        count: &Bound<'py, PyArray1<u32>>,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        let take = |start, counts: Vec<u32>| write(count, start, counts.into_iter());
+        Job { batches: WHOLE, ..self.rays(rays, shape, progress)? }.run(py, query::count, take)
+    }
+
+    /// All that rays meet: where the hits of each begin, distances, triangles, weights, normals.
+    fn intersections<'py>(
+        &self,
+        py: Python<'py>,
+        rays: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        progress: Told<'py>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let mut listed = query::Listed::new();
+        let take = |_, found| {
+            listed.extend(&found);
+            Ok(())
+        };
+        Job { batches: WHOLE, ..self.rays(rays, shape, progress)? }.run(py, query::list, take)?;
+        let hits = listed.t.len();
+        PyTuple::new(
+            py,
+            [
+                PyArray1::from_vec(py, listed.starts).into_any(),
+                PyArray1::from_vec(py, listed.t).into_any(),
+                PyArray1::from_vec(py, listed.triangle).into_any(),
+                PyArray1::from_vec(py, listed.uv.into_flattened()).reshape([hits, 2])?.into_any(),
+                PyArray1::from_vec(py, listed.normal.into_flattened()).reshape([hits, 3])?.into_any(),
+            ],
+        )
+    }
+
+    /// Fills arrays with the nearest points.
+    #[allow(clippy::too_many_arguments)]
+    fn closest<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        point: &Bound<'py, PyArray2<f64>>,
+        distance: &Bound<'py, PyArray1<f64>>,
+        triangle: &Bound<'py, PyArray1<u32>>,
+        uv: &Bound<'py, PyArray2<f32>>,
+        normal: &Bound<'py, PyArray2<f32>>,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        self.points(points, shape, progress)?.run(py, query::closest, |start, found| {
+            write_rows(point, start, found.iter().map(|found| found.point))?;
+            write(distance, start, found.iter().map(|found| found.distance))?;
+            write(triangle, start, found.iter().map(|found| found.triangle))?;
+            write_rows(uv, start, found.iter().map(|found| [found.u, found.v]))?;
+            write_rows(normal, start, found.iter().map(|found| found.normal))
+        })
+    }
+
+    /// Fills an array with whether points are inside.
+    fn occupancy<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        inside: &Bound<'py, PyArray1<bool>>,
+        open: bool,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        let work = move |held: &mut Held, points: &[[f64; 3]], task: &Task| query::occupancy(held, points, open, task);
+        let take = |start, found: Vec<bool>| write(inside, start, found.into_iter());
+        self.points(points, shape, progress)?.run(py, work, take)
+    }
+
+    /// Fills an array with distances, negative inside.
+    fn signed_distance<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        distance: &Bound<'py, PyArray1<f64>>,
+        open: bool,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        let work =
+            move |held: &mut Held, points: &[[f64; 3]], task: &Task| query::signed_distance(held, points, open, task);
+        let take = |start, found: Vec<f64>| write(distance, start, found.into_iter());
+        self.points(points, shape, progress)?.run(py, work, take)
+    }
+
+    /// Fills an array with whether the ways between pairs of points are free.
+    fn visibility<'py>(
+        &self,
+        py: Python<'py>,
+        pairs: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        free: &Bound<'py, PyArray1<bool>>,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        let (rows, named) = (Rows::of(pairs)?, Named { name: "pair", shape });
+        let (check, read): (Check<'py>, Read<'py, _>) = (Rows::check_pairs, Rows::pairs);
+        let job = Job { rows, named, progress, check, read, core: self, batches: WHOLE };
+        let take = |start, found: Vec<bool>| write(free, start, found.into_iter());
+        job.run(py, query::visibility, take)
+    }
+
+    /// A picture: a dict of arrays, and what a person should know of it.
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        settings: &str,
+        chosen: Vec<String>,
+        camera: Option<render::CameraArguments>,
+        progress: Told<'py>,
+    ) -> PyResult<(Bound<'py, PyDict>, Vec<String>)> {
+        render::render(py, &self.desk()?, &self.options, settings, &chosen, camera, progress)
+    }
+}

@@ -1,0 +1,81 @@
+"""Models into scene files."""
+
+import numpy as np
+import pytest
+
+import brickwalk
+import meshes
+
+
+def write_obj(path, vertices, faces):
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture
+def model(tmp_path):
+    return write_obj(tmp_path / "box.obj", *meshes.box())
+
+
+def test_a_model_becomes_a_scene(model, tmp_path):
+    told = []
+    summary = brickwalk.convert(model, tmp_path / "box.bricks", progress=lambda *so_far: told.append(so_far))
+    assert summary["triangles"] == 12 and summary["bricks"] == 1
+    assert summary["bytes"] == (tmp_path / "box.bricks").stat().st_size
+    with brickwalk.Scene.open(tmp_path / "box.bricks", adapter="cpu") as scene:
+        assert scene.info["triangles"] == 12
+        assert scene.cast_rays([[0.25, 0.5, 3, 0, 0, -1]])["t"] == 2.0
+
+
+def test_settings_have_effects(model, tmp_path):
+    out = tmp_path / "box.bricks"
+    brickwalk.convert([model, str(model)], str(out), brick_triangles=4, metres=0.5, up="z", threads=1, memory="1G")
+    with brickwalk.Scene.open(out) as scene:
+        assert scene.info["triangles"] == 24 and scene.info["bricks"] > 4
+        np.testing.assert_allclose(scene.info["bounds"], [[0, 0, -0.5], [0.5, 0.5, 0]])
+
+
+@pytest.mark.parametrize(
+    "options, error, text",
+    [
+        ({"brick_triangles": 0}, ValueError, "brick"),
+        ({"brick_triangles": "many"}, TypeError, "brick_triangles"),
+        ({"textures": "jpeg"}, ValueError, "textures"),
+        ({"up": "x"}, ValueError, "up"),
+        ({"metres": -1.0}, ValueError, "metres"),
+        ({"memory": "all"}, ValueError, "memory"),
+        ({"lattice": "fine"}, TypeError, "lattice"),
+        ({"lattice": 1000}, ValueError, "lattice"),
+        ({"threads": 0}, ValueError, "threads"),
+        ({"progress": 3}, TypeError, "progress"),
+        ({"no_such": 3}, TypeError, "no_such"),
+    ],
+)
+def test_settings_out_of_range(model, tmp_path, options, error, text):
+    with pytest.raises(error, match=text):
+        brickwalk.convert(model, tmp_path / "box.bricks", **options)
+    assert not (tmp_path / "box.bricks").exists()
+
+
+def test_paths_that_do_not_do(model, tmp_path):
+    out = tmp_path / "out.bricks"
+    with pytest.raises(FileNotFoundError, match="none.glb"):
+        brickwalk.convert(tmp_path / "none.glb", out)
+    with pytest.raises(IsADirectoryError):
+        brickwalk.convert(tmp_path, out)
+    with pytest.raises(ValueError, match=".bricks"):
+        brickwalk.convert(model, tmp_path / "out.obj")
+    with pytest.raises(ValueError, match="overwrite"):
+        brickwalk.convert(model, model)
+    with pytest.raises(FileNotFoundError):
+        brickwalk.convert(model, tmp_path / "no" / "out.bricks")
+    with pytest.raises(ValueError, match="no inputs"):
+        brickwalk.convert([], out)
+    (tmp_path / "notes.txt").write_text("")
+    with pytest.raises(ValueError, match="notes.txt"):
+        brickwalk.convert(tmp_path / "notes.txt", out)
+    (tmp_path / "bad.glb").write_bytes(b"glTF but not really")
+    with pytest.raises(brickwalk.BrickwalkError, match="bad.glb"):
+        brickwalk.convert(tmp_path / "bad.glb", out)
+    assert not out.exists()
