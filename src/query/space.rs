@@ -14,7 +14,7 @@ const MARGIN: f64 = 1.0 / (1u64 << 46) as f64;
 /// Greatest inverse of a direction's component: times any coordinate it is finite.
 const MOST_INVERSE: f64 = f64::from_bits((900 + 1023) << 52);
 
-/// Axis-aligned boxes side by side, by axes, world units; those that are no child's have no points.
+/// Axis-aligned boxes side by side, by axes, world units. What slots without a child have is nothing's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Boxes<const N: usize> {
     min: [[f64; N]; 3],

@@ -1,8 +1,8 @@
 //! Items against bricks, each brick once: rays or half-lines that meet all that lies on their way.
 //!
 //! Bricks are taken by runs that the cache holds together. For a run all items walk the top level, those of a chunk at
-//! a time, and are sorted by the bricks that they enter. So a batch reads a brick once, however many items enter it and
-//! however small the cache is, and its memory does not grow with the batch.
+//! a time, and are sorted by the bricks that they enter. So a batch reads a brick once, however many items enter it, if
+//! the cache has 8 MiB or more. Memory does not grow with the batch.
 
 use super::space::{Meets, Placed, Top};
 use super::{Queries, Watch};
