@@ -105,7 +105,8 @@ fn a_person_flies_clicks_and_quits() {
         let first = picture(&output, "city-60K-500.png");
         // Forward, and another picture.
         hand.run("keydown w");
-        std::thread::sleep(Duration::from_millis(600));
+        // Long enough that a loaded machine shows a picture of the way.
+        std::thread::sleep(Duration::from_millis(1500));
         hand.run("keyup w");
         hand.run("key p");
         let second = picture(&output, "city-60K-500-2.png");
