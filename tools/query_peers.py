@@ -8,8 +8,8 @@ they differ.
 
 A row is a query: medians of seconds over the turns, and how often a peer is as fast. Which of two answers is right is
 found by brute force over all triangles in f64, for at most --judged of those that differ. Excused is a ray that meets
-an edge to a thousandth of a triangle, and hits that are as near as to a part in 10^5: positions are rounded to a lattice,
-and rays to f32. The exit status is 1 where ours is neither right nor excused.
+an edge to a thousandth of a triangle. So are hits that are as near to a part in 10^5: positions are rounded to a
+lattice, and rays to f32. The exit status is 1 where ours is neither right nor excused.
 --threads 1 has brickwalk and Open3D use one thread; embreex always does.
 """
 

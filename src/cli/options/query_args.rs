@@ -30,8 +30,8 @@ pub enum Kind {
 }
 
 /// What is read.
-const INPUT: &str = "The input is a NumPy array, float64 or float32, of shape (..., 6) or (..., 8) for cast, any, count \
-     and all: origin xyz, direction xyz, t_min, t_max; (..., 3) for points; (..., 6) for visibility: two points. The \
+const INPUT: &str = "The input is a NumPy array, float64 or float32, of shape (..., 6) or (..., 8) for cast, any, \
+     count and all: origin xyz, direction xyz, t_min, t_max; (..., 3) for points; (..., 6) for visibility: two points. The \
      output has an element a row, in the input's shape, but that of all has one a hit. Queries are exact, of geometry \
      alone; cast and any are what rendering sees, where materials let rays pass.";
 
