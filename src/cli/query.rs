@@ -3,24 +3,14 @@
 use super::cached;
 use super::options::query_args::{Kind, QueryArgs};
 use crate::cli::output::print_json;
-use crate::cpu::available_memory;
-use crate::kernels::layout::NONE;
 use crate::output::npy::{self, Hit, Ray, Rays, Rows};
 use crate::query::{Closest, Queries, Watch};
-use crate::session::trace::{check, for_rays, trace};
-use crate::session::{Opened, Settings};
-use crate::settings::CacheSize;
+use crate::session::trace::check;
 use anyhow::{Context, Result};
-use bricks::{Access, Payload, SceneFile};
+use bricks::{Access, SceneFile};
 use brickwalk_convert::progress::Progress;
 use std::path::Path;
 use std::sync::Arc;
-
-/// Bytes of a cache where nothing is known of the machine's memory.
-const UNKNOWN: u64 = 1 << 30;
-
-/// Bytes that a cache of all geometry has beside it, for what is in use.
-const BESIDE: u64 = 8 << 20;
 
 /// Runs the command.
 ///
@@ -35,11 +25,7 @@ pub fn run(args: &QueryArgs) -> Result<()> {
     let scene = Arc::new(SceneFile::open_with(path, Access::Read)?);
     let progress = Progress::new();
     progress.phase(input.name(), input.len());
-    let (answers, stats) = match &input {
-        Input::Rays(rays) if matches!(args.kind, Kind::Cast | Kind::Any) => cast(args, path, scene, rays, &progress),
-        _ => ask(args, scene, &input, &progress),
-    }
-    .with_context(|| path.display().to_string())?;
+    let (answers, stats) = ask(args, scene, &input, &progress).with_context(|| path.display().to_string())?;
     progress.finish();
     answers.write(&args.output, input.shape())?;
     if args.json {
@@ -118,26 +104,6 @@ enum Answers {
     Distances(Vec<f64>),
 }
 
-/// As rendering finds it, on the default device.
-fn cast(
-    args: &QueryArgs,
-    path: &Path,
-    scene: Arc<SceneFile>,
-    rays: &Rays,
-    progress: &Progress,
-) -> Result<(Answers, serde_json::Value)> {
-    let settings = for_rays(&Settings { cache: args.cache, ..Settings::default() });
-    let mut opened = Opened::open(scene, path, &settings)?;
-    let any = args.kind == Kind::Any;
-    let (hits, stats) = trace(&mut opened.traced(), &rays.rays, any, &mut |rays| progress.advance(rays))?;
-    let stats = serde_json::json!({
-        "bricks_loaded": stats.bricks_loaded,
-        "bytes_read": stats.bytes_bvh + stats.bytes_geometry + stats.bytes_attributes,
-    });
-    let hit = |hit: &Hit| hit.triangle != NONE;
-    Ok((if any { Answers::Truths(hits.iter().map(hit).collect()) } else { Answers::Hits(hits) }, stats))
-}
-
 /// By queries.
 fn ask(
     args: &QueryArgs,
@@ -145,8 +111,7 @@ fn ask(
     input: &Input,
     progress: &Progress,
 ) -> Result<(Answers, serde_json::Value)> {
-    let bytes = cache_bytes(&scene, args.cache);
-    let queries = Queries::new(scene, bytes, args.threads.unwrap_or(0) as usize)?;
+    let queries = Queries::new(scene, args.cache, args.threads.unwrap_or(0) as usize)?;
     let mut advance = |done: u64| {
         progress.advance(done);
         Ok(())
@@ -171,6 +136,8 @@ fn ask(
 
 fn of_rays(queries: &Queries, kind: Kind, rays: &[Ray], watch: &mut Watch) -> Result<Answers> {
     Ok(match kind {
+        Kind::Cast => Answers::Hits(queries.cast(rays, watch)?),
+        Kind::Any => Answers::Truths(queries.any(rays, watch)?),
         Kind::All => Answers::All(queries.list_intersections(rays, watch)?),
         _ => Answers::Counts(queries.count_intersections(rays, watch)?),
     })
@@ -186,13 +153,6 @@ fn of_points(queries: &Queries, args: &QueryArgs, points: &[[f64; 3]], watch: &m
         }
         _ => Answers::Closest(queries.closest_points(points, watch)?),
     })
-}
-
-/// The bytes that `--cache` asks for. What is in use takes a part of them, so that all geometry has more than its size.
-fn cache_bytes(scene: &SceneFile, cache: CacheSize) -> u64 {
-    let bricks = 0..scene.resident().exact_bricks() as u32;
-    let all: u64 = bricks.map(|brick| scene.loaded_bytes(Payload::Geometry(brick))).sum();
-    cache.bytes(all + all / 2 + BESIDE, available_memory().map_or(UNKNOWN, |bytes| bytes / 4))
 }
 
 impl Answers {

@@ -3,26 +3,10 @@
 
 use crate::kernels::payloads::{AttributeView, BrickView};
 use crate::schedule::{BrickStates, ExecutorError, Load};
-use crate::stream::{Destination, Item, Slot, Workers};
+use crate::stream::{Item, Shared, Slot, Workers};
 use bricks::{Resident, SceneFile};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Where a worker puts a payload: memory that it may share with the host cache.
-#[derive(Default)]
-pub struct Shared(Option<Arc<[u8]>>);
-
-impl Destination for Shared {
-    const SHARES: bool = true;
-
-    fn fill(&mut self, bytes: &[u8]) {
-        self.share(Arc::from(bytes));
-    }
-
-    fn share(&mut self, payload: Arc<[u8]>) {
-        self.0 = Some(payload);
-    }
-}
 
 /// What is resident.
 pub struct BrickCache {

@@ -5,9 +5,11 @@
 //! lay a hair beside it. Nothing depends on a tolerance. The sum of the directions of all crossings is the winding
 //! number of a surface that is closed and turned one way; of one that is only closed, whether they are odd tells.
 
+use super::room::Room;
 use super::space::{AlongX, Placed};
 use super::sweep::Sweep;
 use super::{Queries, Watch};
+use crate::kernels::simd::isa::Isa;
 use anyhow::{Result, bail};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -66,10 +68,12 @@ impl Sweep for Crossed<'_> {
         Some(AlongX(DVec3::from_array(self.points[item])))
     }
 
-    fn meet(&self, item: usize, _: u32, brick: &Placed, open: &mut Vec<u32>, found: &mut Vec<Self::Found>) {
+    #[inline(always)]
+    fn meet<I: Isa>(&self, _: I, item: usize, at: (u32, &Placed), room: &mut Room, found: &mut Vec<Self::Found>) {
+        let brick = at.1;
         let point = DVec3::from_array(self.points[item]);
         let (mut sum, mut count) = (0, 0);
-        brick.walk(&AlongX(point), open, |triangle| {
+        brick.walk(&AlongX(point), &mut room.nodes, |triangle| {
             let way = brick.handedness * crossed(point, brick.vertices(triangle));
             if way != 0 && self.by_id {
                 found.push((item, brick.id(triangle), way, 1));

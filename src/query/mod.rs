@@ -5,35 +5,51 @@
 //! bricks, answered, and handed back in the order in which it was given. Bricks come through a cache of the size that
 //! is asked for, so that memory grows with what the caller holds and not with the scene.
 //!
-//! They are of geometry alone: what materials say of opacity does not matter here. Closest hits as rendering finds them
-//! are [`crate::Session::trace`]'s.
+//! They are of geometry: of what materials say only those that look for one hit, cast and any, take note.
 //!
 //! | query | answers by |
 //! | --- | --- |
-//! | count, list, visibility | `rays.rs`, over `sweep.rs`: each brick once |
-//! | closest points, distance | `nearest.rs`: nearest bricks first, by rounds |
+//! | cast, any, visibility | `cast.rs`, by `rounds.rs`: the bricks that are needed, each once |
+//! | closest points, distance | `nearest.rs`, likewise |
+//! | count, list | `rays.rs`, over `sweep.rs`: all bricks on the way, each once |
 //! | occupancy, signed distance | `inside.rs`: winding along an axis; `closed.rs` says whether it has a meaning |
 
+mod cast;
 mod closed;
 mod hits;
 mod inside;
 mod nearest;
 mod rays;
+mod room;
+mod rounds;
 mod space;
 mod store;
 mod sweep;
+mod top;
+mod walk;
 
 #[cfg(test)]
 mod tests;
 
 pub use closed::Surface;
 
-use crate::output::npy::Hit;
-use anyhow::{Result, bail};
-use bricks::SceneFile;
+use crate::cpu::available_memory;
+use crate::output::npy::{Hit, Ray};
+use crate::session::trace::check;
+use crate::settings::CacheSize;
+use anyhow::{Context, Result, bail};
+use bricks::{Payload, SceneFile};
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::{Arc, OnceLock};
 use store::Store;
+use top::Top;
+
+/// Bytes of a cache where nothing is known of the machine's memory.
+const UNKNOWN: u64 = 1 << 30;
+
+/// Bytes that a cache of everything has beside it, for what is in use.
+const BESIDE: u64 = 8 << 20;
 
 /// Is told how many more items are done; 0 says that work goes on. An error ends the work and is handed back.
 pub type Watch<'a> = dyn FnMut(u64) -> Result<()> + 'a;
@@ -48,6 +64,7 @@ pub struct Queries {
     /// Whether some triangle lies in several bricks.
     has_copies: bool,
     surfaces: OnceLock<Vec<Surface>>,
+    top: OnceLock<Top>,
 }
 
 /// All that rays meet.
@@ -88,22 +105,42 @@ pub struct QueryStats {
 }
 
 impl Queries {
-    /// Asks `scene`, with a cache of `cache_bytes` for geometry, of which what is in use takes a quarter or 4 MiB; on
-    /// so many threads, 0 for as many as the processor has.
+    /// Asks `scene`, with a cache of host memory, of which what is in use takes a quarter or 4 MiB; on so many threads,
+    /// 0 for as many as the processor has. By itself the cache holds all or takes a quarter of the memory that is
+    /// available. All is geometry and attributes, and room for what is in use beside them.
     ///
     /// # Errors
     /// A thread cannot be started.
-    pub fn new(scene: Arc<SceneFile>, cache_bytes: u64, threads: usize) -> Result<Self> {
+    pub fn new(scene: Arc<SceneFile>, cache: CacheSize, threads: usize) -> Result<Self> {
+        let bricks = 0..scene.resident().exact_bricks() as u32;
+        let bytes =
+            |brick| scene.loaded_bytes(Payload::Geometry(brick)) + scene.loaded_bytes(Payload::Attributes(brick));
+        let all: u64 = bricks.map(bytes).sum();
+        let room = available_memory().map_or(UNKNOWN, |bytes| bytes / 4);
+        let cache_bytes = cache.bytes(all + all / 2 + BESIDE, room);
         let name = |number| format!("query {number}");
         let threads = ThreadPoolBuilder::new().num_threads(threads).thread_name(name).build()?;
         let store = Store::new(scene.clone(), cache_bytes, threads.current_num_threads())?;
         let has_copies = closed::has_copies(scene.resident());
-        Ok(Self { scene, store, threads, has_copies, surfaces: OnceLock::new() })
+        let (surfaces, top) = (OnceLock::new(), OnceLock::new());
+        Ok(Self { scene, store, threads, has_copies, surfaces, top })
     }
 
     /// The scene.
     pub fn scene(&self) -> &Arc<SceneFile> {
         &self.scene
+    }
+
+    /// The top level, made when it is first asked for.
+    fn top(&self) -> &Top {
+        self.top.get_or_init(|| Top::new(self.scene.resident()))
+    }
+
+    /// Refuses rays that are none.
+    fn check_rays(&self, rays: &[Ray]) -> Result<()> {
+        let is_bad = |(number, ray): (usize, &Ray)| Some((number, check(ray).err()?));
+        let bad = self.threads.install(|| rays.par_iter().enumerate().find_map_first(is_bad));
+        bad.map_or(Ok(()), |(number, error)| Err(error).with_context(|| format!("ray {number}")))
     }
 
     /// What was read and held so far.

@@ -1,25 +1,23 @@
-//! The point of the scene that is nearest to a given one.
-//!
-//! Points that lie together go together, along a Z-order curve. In a round each asks for the leaves that are nearest to
-//! it and have not been looked at, as long as they are nearer than what it has; first one, then twice as many a round.
-//! The bricks of a round are read once each.
+//! The point of the scene that is nearest to a given one: each looks into bricks, about the nearest first.
 
 use super::hits::normal;
-use super::space::{Child, Placed, Top};
-use super::sweep::Pair;
+use super::room::Room;
+use super::rounds::{Bricks, Seek, State};
+use super::space::Placed;
 use super::{Closest, Queries, Watch};
 use crate::kernels::layout::NONE;
+use crate::kernels::simd::isa::Isa;
 use anyhow::Result;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::cmp::{Ordering, Reverse};
-use std::collections::BinaryHeap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::cmp::Ordering;
 
-/// Points that are looked for together.
-const CHUNK: usize = 1 << 14;
-/// Most leaves that a point asks for in a round.
-const MOST_LEAVES: usize = 16;
+/// Of squared distances: how much farther something has to be.
+const SLACK: f64 = 1.0 / (1u64 << 20) as f64;
+/// Of squared coordinates: with [`SLACK`] more than all roundings of distances and of heights over planes.
+const ROUNDED: f64 = 1.0 / (1u64 << 55) as f64;
+/// The least squared sine between two edges of a triangle by whose plane it is judged.
+const LEAST_SINE: f64 = 1.0 / (1u64 << 26) as f64;
 
 /// A point of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +61,22 @@ pub(super) fn nearest_on_triangle([a, b, c]: [DVec3; 3]) -> OnTriangle {
     best
 }
 
+/// Whether a triangle is farther from the origin than the square root of `within` for certain: by its box, and by its
+/// plane. False says nothing.
+#[inline(always)]
+fn is_surely_farther([a, b, c]: [DVec3; 3], within: f64) -> bool {
+    let reach = a.length_squared().max(b.length_squared()).max(c.length_squared());
+    let within = within * (1.0 + SLACK) + reach * ROUNDED;
+    let gap = a.min(b).min(c).max(-a.max(b).max(c)).max(DVec3::ZERO);
+    if gap.length_squared() > within {
+        return true;
+    }
+    let (u, v) = (b - a, c - a);
+    let across = u.cross(v);
+    let (area, height) = (across.length_squared(), across.dot(a));
+    area > LEAST_SINE * u.length_squared() * v.length_squared() && height * height > within * area
+}
+
 /// What a point has found.
 #[derive(Clone, Copy)]
 struct Best {
@@ -90,84 +104,55 @@ impl Best {
         by_distance.then(self.id.cmp(&other.id)) == Ordering::Less
     }
 
-    /// The best in a brick, or this.
-    fn within(self, point: DVec3, leaf: u32, brick: &Placed, open: &mut Vec<(f64, Child)>) -> Self {
-        let mut best = self;
-        brick.walk_near(point, self.distance_squared, open, |triangle| {
+    /// Has it be the best in a brick, if that is better.
+    #[inline(always)]
+    fn look_into(&mut self, point: DVec3, (leaf, brick): (u32, &Placed), room: &mut Room) {
+        brick.walk_near(point, self.distance_squared, &mut room.open, |triangle| {
             let vertices = brick.vertices(triangle);
-            let on = nearest_on_triangle(vertices.map(|vertex| vertex - point));
+            let relative = [vertices[0] - point, vertices[1] - point, vertices[2] - point];
+            if is_surely_farther(relative, self.distance_squared) {
+                return self.distance_squared;
+            }
+            let on = nearest_on_triangle(relative);
             let distance_squared = on.offset.length_squared();
-            if distance_squared <= best.distance_squared {
+            if distance_squared <= self.distance_squared {
                 let id = brick.id(triangle);
-                let own = Self { distance_squared, id, leaf, triangle, on, normal: normal(vertices) };
-                if own.is_before(&best) {
-                    best = own;
+                let own = Self { distance_squared, id, leaf, triangle, on, normal: [0.0; 3] };
+                if own.is_before(self) {
+                    *self = Self { normal: normal(vertices), ..own };
                 }
+            }
+            self.distance_squared
+        });
+    }
+}
+
+/// Points that look for what is nearest.
+struct Nearest<'a>(&'a Queries);
+
+impl Seek for Nearest<'_> {
+    type Item = [f64; 3];
+
+    type Found = Best;
+
+    #[inline(always)]
+    fn go<I: Isa>(&self, _: I, point: &[f64; 3], best: &mut Best, bricks: &Bricks, room: &mut Room) -> Option<u32> {
+        let (resident, point) = (self.0.scene.resident(), DVec3::from_array(*point));
+        let exact = resident.exact_bricks() as u32;
+        let brick = |leaf: u32| resident.leaves[leaf as usize].brick;
+        let counts = |leaf: u32| brick(leaf) < exact;
+        // The nearest brick that is away, and how near it is at least.
+        let mut next = (f64::INFINITY, NONE);
+        self.0.top().near_leaves(point, best.distance_squared, room, counts, |room, leaf, distance| {
+            match bricks.get(brick(leaf)) {
+                State::AtHand(geometry) => best.look_into(point, (leaf, &Placed::new(resident, leaf, geometry)), room),
+                State::Away if distance < next.0 => next = (distance, brick(leaf)),
+                _ => (),
             }
             best.distance_squared
         });
-        best
+        (next.1 != NONE && next.0 <= best.distance_squared).then_some(next.1)
     }
-}
-
-/// A number that orders as it should.
-#[derive(Clone, Copy, PartialEq)]
-struct Ordered(f64);
-
-impl Eq for Ordered {}
-
-impl PartialOrd for Ordered {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-
-impl Ord for Ordered {
-    fn cmp(&self, other: &Self) -> Ordering {
-        self.0.total_cmp(&other.0)
-    }
-}
-
-impl Top<'_> {
-    /// The next `count` leaves by their distance from `point`, squared, after the one given, and no farther than
-    /// `within`.
-    fn nearest_leaves(&self, point: DVec3, after: (f64, u32), within: f64, count: usize) -> Vec<(f64, u32)> {
-        let mut found = Vec::new();
-        let mut open = BinaryHeap::new();
-        if !self.is_empty() {
-            open.push(Reverse((Ordered(0.0), false, 0)));
-        }
-        while let Some(Reverse((Ordered(distance), is_leaf, number))) = open.pop() {
-            if distance > within || found.len() == count {
-                break;
-            }
-            if is_leaf {
-                if distance.total_cmp(&after.0).then(number.cmp(&after.1)) == Ordering::Greater {
-                    found.push((distance, number));
-                }
-                continue;
-            }
-            // Never nearer than what holds them, so that leaves come in order.
-            let own = self.boxes(number).distances_squared(point).map(|own| Ordered(own.max(distance)));
-            match self.below(number) {
-                Ok(leaf) => open.push(Reverse((own[0], true, leaf))),
-                Err([left, right]) => {
-                    open.extend([Reverse((own[0], false, left)), Reverse((own[1], false, right))]);
-                }
-            }
-        }
-        found
-    }
-}
-
-/// A point that is looked for.
-#[derive(Clone, Copy)]
-struct Search {
-    point: DVec3,
-    best: Best,
-    /// The leaf that was looked at last: its distance, squared, and its number.
-    after: (f64, u32),
-    is_done: bool,
 }
 
 impl Queries {
@@ -178,100 +163,24 @@ impl Queries {
     /// A point that is not finite, by its number; a damaged brick; what `watch` says.
     pub fn closest_points(&self, points: &[[f64; 3]], watch: &mut Watch) -> Result<Vec<Closest>> {
         super::check_points(points)?;
+        let all = self.seek(&Nearest(self), points, || NOTHING, &[], watch)?;
+        let of: Vec<_> = all.iter().map(|best| (best.leaf, best.triangle, best.on.weights)).collect();
         let nowhere =
             Closest { point: [f64::NAN; 3], distance: f64::INFINITY, triangle: NONE, u: 0.0, v: 0.0, normal: [0.0; 3] };
-        let mut all = vec![nowhere; points.len()];
-        // Attributes of bricks are read once at the end, so that they do not put geometry out of the cache.
-        let (mut found, mut of) = (Vec::new(), Vec::new());
-        for numbers in self.threads.install(|| z_order(points)).chunks(CHUNK) {
-            let given: Vec<DVec3> = numbers.iter().map(|&number| DVec3::from_array(points[number])).collect();
-            for ((&number, point), best) in numbers.iter().zip(&given).zip(self.search(&given, watch)?) {
-                if best.id == NONE {
-                    continue;
-                }
-                all[number] = Closest {
-                    point: (point + best.on.offset).to_array(),
-                    distance: best.distance_squared.sqrt(),
-                    triangle: best.id,
-                    normal: best.normal,
-                    ..nowhere
-                };
-                found.push(number);
-                of.push((best.leaf, best.triangle, best.on.weights));
-            }
-            watch(numbers.len() as u64)?;
-        }
-        for (number, [u, v]) in found.into_iter().zip(self.source_weights(&of)?) {
-            (all[number].u, all[number].v) = (u, v);
-        }
-        Ok(all)
+        let closest = |((point, best), [u, v]): ((&[f64; 3], Best), [f32; 2])| match best.id {
+            NONE => nowhere,
+            triangle => Closest {
+                point: (DVec3::from_array(*point) + best.on.offset).to_array(),
+                distance: best.distance_squared.sqrt(),
+                triangle,
+                u,
+                v,
+                normal: best.normal,
+            },
+        };
+        let weights = self.source_weights(&of)?;
+        Ok(self.threads.install(|| points.par_iter().zip(all).zip(weights).map(closest).collect()))
     }
-
-    /// What is nearest to each point of a chunk.
-    fn search(&self, points: &[DVec3], watch: &mut Watch) -> Result<Vec<Best>> {
-        let resident = self.scene.resident();
-        let top = Top::new(resident);
-        let begun = |&point: &DVec3| Search { point, best: NOTHING, after: (-1.0, 0), is_done: false };
-        let mut searches: Vec<Mutex<Search>> = points.iter().map(begun).map(Mutex::new).collect();
-        let mut count = 1;
-        loop {
-            let wanted = |(item, search): (usize, &mut Mutex<Search>)| {
-                let search = search.get_mut().unwrap_or_else(PoisonError::into_inner);
-                if search.is_done {
-                    return Vec::new();
-                }
-                let leaves = top.nearest_leaves(search.point, search.after, search.best.distance_squared, count);
-                search.is_done = leaves.len() < count;
-                search.after = leaves.last().copied().unwrap_or(search.after);
-                let pair = |(_, leaf)| Pair { brick: resident.leaves[leaf as usize].brick, leaf, item: item as u32 };
-                leaves.into_iter().map(pair).collect()
-            };
-            let pairs = self.threads.install(|| {
-                let mut pairs: Vec<Pair> = searches.par_iter_mut().enumerate().flat_map_iter(wanted).collect();
-                pairs.par_sort_unstable();
-                pairs
-            });
-            if pairs.is_empty() {
-                return Ok(searches.iter().map(|search| locked(search).best).collect());
-            }
-            // What is nearest does not depend on the order in which bricks are looked at.
-            let look = |item: u32, leaf, brick: &Placed, open: &mut Vec<(f64, Child)>, _: &mut Vec<()>| {
-                let Search { point, best, .. } = *locked(&searches[item as usize]);
-                let own = best.within(point, leaf, brick, open);
-                let mut search = locked(&searches[item as usize]);
-                if own.is_before(&search.best) {
-                    search.best = own;
-                }
-            };
-            self.at_leaves(&pairs, look, &mut |()| (), watch)?;
-            count = (2 * count).min(MOST_LEAVES);
-        }
-    }
-}
-
-/// Every change of a search is complete, so that a poisoned lock guards a sound state.
-fn locked(search: &Mutex<Search>) -> MutexGuard<'_, Search> {
-    search.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Numbers of points along a Z-order curve through their box.
-fn z_order(points: &[[f64; 3]]) -> Vec<usize> {
-    let at = |point: &[f64; 3]| DVec3::from_array(*point);
-    let min = points.par_iter().map(at).reduce(|| DVec3::INFINITY, DVec3::min);
-    let max = points.par_iter().map(at).reduce(|| DVec3::NEG_INFINITY, DVec3::max);
-    let extent = (0.5 * max - 0.5 * min).max_element();
-    let spread = |x: f64| {
-        // Casts saturate; without an extent it is no number, which is 0.
-        let cell = (((x / extent) * 0.5 * 1023.0) as u64).min(1023);
-        (0..10).fold(0, |bits, bit| bits | (cell >> bit & 1) << (3 * bit))
-    };
-    let code = |point: &[f64; 3]| {
-        let from = 1.0 * at(point) - min;
-        spread(from.x) << 2 | spread(from.y) << 1 | spread(from.z)
-    };
-    let mut order: Vec<(u64, usize)> = points.par_iter().map(code).zip(0..points.len()).collect();
-    order.par_sort_unstable();
-    order.into_iter().map(|(_, number)| number).collect()
 }
 
 #[cfg(test)]
@@ -312,16 +221,22 @@ mod tests {
     }
 
     #[test]
-    fn points_that_lie_together_come_together() {
-        let points: Vec<[f64; 3]> = (0..4096u32).map(|i| [i % 16, i / 16 % 16, i / 256].map(f64::from)).collect();
-        let way = |order: &[usize]| -> f64 {
-            let at = |i: usize| DVec3::from_array(points[i]);
-            order.windows(2).map(|pair| (at(pair[1]) - at(pair[0])).length()).sum()
-        };
-        let order = z_order(&points);
-        let rows: Vec<usize> = (0..points.len()).collect();
-        assert!(way(&order) < 0.95 * way(&rows), "{} {}", way(&order), way(&rows));
-        assert_eq!(z_order(&[[f64::MAX; 3], [-f64::MAX; 3]]).len(), 2);
-        assert_eq!(z_order(&[[1.0; 3]; 3]), [0, 1, 2]);
+    fn what_is_surely_farther_is_farther() {
+        let mut rng = crate::math::random::Rng(9);
+        let (mut farther, mut told) = (0, 0);
+        for i in 0..20_000 {
+            let mut point = |scale: f64| DVec3::from_array([0; 3].map(|_| scale * f64::from(rng.signed())));
+            // Plain ones, needles, and such as are far away.
+            let (spread, away) = [(1.0, 1.0), (1e-7, 1.0), (1.0, 1e7)][i % 3];
+            let a = point(away);
+            let b = a + point(1.0);
+            let triangle = [a, b, a + 0.5 * (b - a) + point(spread)];
+            let nearest = nearest_on_triangle(triangle).offset.length_squared();
+            let within = nearest * (1.0 + 1e-3 * f64::from(rng.signed()));
+            let is_told = is_surely_farther(triangle, within);
+            assert!(!is_told || nearest > within, "{triangle:?} {within}");
+            (farther, told) = (farther + u32::from(nearest > within), told + u32::from(is_told));
+        }
+        assert!(farther > 8000 && told > 500, "{told} of {farther}");
     }
 }

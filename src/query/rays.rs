@@ -1,51 +1,52 @@
 //! All that rays meet: how many triangles, which, or whether any.
 
 use super::hits::Met;
+use super::room::Room;
 use super::space::{Placed, Slabs};
 use super::sweep::Sweep;
+use super::top::Top;
+use super::walk::Aim;
 use super::{Intersections, Queries, Watch};
-use crate::math::crossing::{Crossing, Line, crossing};
+use crate::kernels::simd::isa::Isa;
+use crate::math::crossing::Crossing;
 use crate::output::npy::Ray;
-use crate::session::trace::check;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Of the greatest coordinate of a point that is to see another: how much of its surroundings is left out, so that a
 /// point that was rounded to f32 does not hide behind its own surface.
 const ROUNDED: f64 = 1.0 / (1u32 << 22) as f64;
 
-/// A ray as boxes and triangles take it; its interval is closed.
-struct Along {
-    line: Line,
-    slabs: Slabs,
-    t_min: f64,
-    t_max: f64,
+/// How a ray asks boxes of the top level.
+fn asks(ray: &Ray) -> Slabs {
+    Slabs::new(ray.origin, ray.direction, ray.t_min.max(0.0), ray.t_max)
 }
 
-impl Along {
-    fn new(ray: &Ray) -> Self {
-        let &Ray { origin, direction, t_min, t_max } = ray;
-        let t_min = t_min.max(0.0);
-        let slabs = Slabs::new(origin, direction, t_min, t_max);
-        Self { line: Line { reference: [0.0; 3], origin, direction }, slabs, t_min, t_max }
-    }
-
-    /// Calls `visit` with every triangle of a brick that the ray meets, its vertices and where; false ends it.
-    #[inline(always)]
-    fn meet(&self, brick: &Placed, open: &mut Vec<u32>, mut visit: impl FnMut(u32, [DVec3; 3], &Crossing) -> bool) {
-        brick.walk(&self.slabs, open, |triangle| {
-            let vertices = brick.vertices(triangle);
-            let met = crossing(&self.line, vertices.map(|vertex| vertex.to_array()));
-            met.filter(|met| (self.t_min..=self.t_max).contains(&met.t))
-                .is_none_or(|met| visit(triangle, vertices, &met))
-        });
-    }
+/// Calls `visit` with every triangle of a brick that a ray meets, its vertices and where.
+#[inline(always)]
+fn meet<I: Isa>(
+    isa: I,
+    (top, ray): (&Top, &Ray),
+    brick: &Placed,
+    room: &mut Room,
+    mut visit: impl FnMut(u32, [DVec3; 3], &Crossing),
+) {
+    let Some(aim) = Aim::new(top, ray) else { return };
+    aim.triangles(isa, brick, (0.0, aim.t_max), room, |triangle| {
+        let vertices = brick.vertices(triangle);
+        if let Some(met) = aim.meet(vertices) {
+            visit(triangle, vertices, &met);
+        }
+        Some(aim.t_max)
+    });
 }
 
 /// Rays that list what they meet.
-struct Listed<'a>(&'a [Ray]);
+struct Listed<'a> {
+    top: &'a Top,
+    rays: &'a [Ray],
+}
 
 impl Sweep for Listed<'_> {
     type Found = Met;
@@ -53,19 +54,21 @@ impl Sweep for Listed<'_> {
     type Asks = Slabs;
 
     fn asks(&self, item: usize) -> Option<Slabs> {
-        Some(Along::new(&self.0[item]).slabs)
+        Some(asks(&self.rays[item]))
     }
 
-    fn meet(&self, item: usize, leaf: u32, brick: &Placed, open: &mut Vec<u32>, found: &mut Vec<Met>) {
-        Along::new(&self.0[item]).meet(brick, open, |triangle, vertices, &Crossing { t, weights, .. }| {
+    #[inline(always)]
+    fn meet<I: Isa>(&self, isa: I, item: usize, at: (u32, &Placed), room: &mut Room, found: &mut Vec<Met>) {
+        let (leaf, brick) = at;
+        meet(isa, (self.top, &self.rays[item]), brick, room, |triangle, vertices, &Crossing { t, weights, .. }| {
             found.push(Met { item, t, id: brick.id(triangle), leaf, triangle, weights, vertices });
-            true
         });
     }
 }
 
 /// Rays that count what they meet.
 struct Counted<'a> {
+    top: &'a Top,
     rays: &'a [Ray],
     /// Whether ids are told, so that copies of a triangle in several bricks count once.
     by_id: bool,
@@ -78,58 +81,22 @@ impl Sweep for Counted<'_> {
     type Asks = Slabs;
 
     fn asks(&self, item: usize) -> Option<Slabs> {
-        Some(Along::new(&self.rays[item]).slabs)
+        Some(asks(&self.rays[item]))
     }
 
-    fn meet(&self, item: usize, _: u32, brick: &Placed, open: &mut Vec<u32>, found: &mut Vec<(usize, u32)>) {
-        let mut count = 0;
-        Along::new(&self.rays[item]).meet(brick, open, |triangle, _, _| {
+    #[inline(always)]
+    fn meet<I: Isa>(&self, isa: I, item: usize, at: (u32, &Placed), room: &mut Room, found: &mut Vec<Self::Found>) {
+        let (mut count, brick) = (0, at.1);
+        meet(isa, (self.top, &self.rays[item]), brick, room, |triangle, _, _| {
             count += 1;
             if self.by_id {
                 found.push((item, brick.id(triangle)));
             }
-            true
         });
         if !self.by_id && count > 0 {
             found.push((item, count));
         }
     }
-}
-
-/// Rays that end where they meet anything.
-struct Stopped<'a> {
-    rays: &'a [Ray],
-    stopped: &'a [AtomicBool],
-}
-
-impl Stopped<'_> {
-    fn is_stopped(&self, item: usize) -> bool {
-        self.stopped[item].load(Ordering::Relaxed)
-    }
-}
-
-impl Sweep for Stopped<'_> {
-    type Found = ();
-
-    type Asks = Slabs;
-
-    fn asks(&self, item: usize) -> Option<Slabs> {
-        (!self.is_stopped(item)).then(|| Along::new(&self.rays[item]).slabs)
-    }
-
-    fn meet(&self, item: usize, _: u32, brick: &Placed, open: &mut Vec<u32>, _: &mut Vec<()>) {
-        if !self.is_stopped(item) {
-            Along::new(&self.rays[item]).meet(brick, open, |_, _, _| {
-                self.stopped[item].store(true, Ordering::Relaxed);
-                false
-            });
-        }
-    }
-}
-
-fn checked(rays: &[Ray]) -> Result<()> {
-    let bad = rays.par_iter().enumerate().find_map_first(|(number, ray)| Some((number, check(ray).err()?)));
-    bad.map_or(Ok(()), |(number, error)| Err(error).with_context(|| format!("ray {number}")))
 }
 
 impl Queries {
@@ -138,7 +105,7 @@ impl Queries {
     /// # Errors
     /// A ray that is none, by its number; a damaged brick; what `watch` says.
     pub fn count_intersections(&self, rays: &[Ray], watch: &mut Watch) -> Result<Vec<u32>> {
-        checked(rays)?;
+        self.check_rays(rays)?;
         let mut counts = vec![0u32; rays.len()];
         let mut copies = Vec::new();
         let by_id = self.has_copies;
@@ -146,7 +113,7 @@ impl Queries {
             true => copies.push((item, what)),
             false => counts[item] += what,
         };
-        self.sweep(rays.len(), &Counted { rays, by_id }, &mut take, watch)?;
+        self.sweep(rays.len(), &Counted { top: self.top(), rays, by_id }, &mut take, watch)?;
         // A triangle that lies in several bricks counts once.
         copies.par_sort_unstable();
         copies.dedup();
@@ -160,9 +127,9 @@ impl Queries {
     /// # Errors
     /// As of [`Queries::count_intersections`].
     pub fn list_intersections(&self, rays: &[Ray], watch: &mut Watch) -> Result<Intersections> {
-        checked(rays)?;
+        self.check_rays(rays)?;
         let mut all = Vec::new();
-        self.sweep(rays.len(), &Listed(rays), &mut |met| all.push(met), watch)?;
+        self.sweep(rays.len(), &Listed { top: self.top(), rays }, &mut |met| all.push(met), watch)?;
         all.par_sort_unstable_by(|a, b| (a.item, a.id).cmp(&(b.item, b.id)).then(a.t.total_cmp(&b.t)));
         all.dedup_by_key(|met| (met.item, met.id));
         all.par_sort_unstable_by(|a, b| a.item.cmp(&b.item).then(a.t.total_cmp(&b.t)).then(a.id.cmp(&b.id)));
@@ -192,9 +159,7 @@ impl Queries {
             Ray { origin: *from, direction: direction.to_array(), t_min, t_max }
         };
         let rays: Vec<Ray> = from.par_iter().zip(to).map(ray).collect();
-        checked(&rays)?;
-        let stopped: Vec<AtomicBool> = rays.iter().map(|_| AtomicBool::new(false)).collect();
-        self.sweep(rays.len(), &Stopped { rays: &rays, stopped: &stopped }, &mut |()| (), watch)?;
-        Ok(stopped.into_iter().map(|stopped| !stopped.into_inner()).collect())
+        let hides = self.meets_any(&rays, false, watch)?;
+        Ok(hides.into_iter().map(|hides| !hides).collect())
     }
 }

@@ -1,12 +1,13 @@
-//! The scene in f64, where it lies: boxes of the top level and of bricks' nodes, and triangles.
+//! The scene in f64, where it lies: boxes of nodes, and triangles.
 //!
 //! Vertices are those of the file, on their lattice, placed by the f64 matrix of their instance and rounded once.
 //! Boxes are grown by more than any rounding here, so that what misses a box meets nothing in it.
 
+use super::room::nearest_on_top;
 use crate::kernels::payloads::BrickView;
 use crate::kernels::trace::node::inner_before;
 use crate::session::trace::Scaled;
-use bricks::{Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Node, Resident, TOP_LEAF, TopNode2};
+use bricks::{Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Node, Resident};
 use glam::DVec3;
 
 /// Of coordinates that took part: many times the f64 roundings of what is computed from them.
@@ -30,6 +31,21 @@ pub(super) trait Meets {
 }
 
 impl<const N: usize> Boxes<N> {
+    /// Boxes where their bounds say, but for roundings of those.
+    pub(super) fn new(min: [[f64; N]; 3], max: [[f64; N]; 3]) -> Self {
+        let reach = |axes: &[[f64; N]; 3]| axes.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let pad = MARGIN * reach(&min).max(reach(&max));
+        Self { min, max, pad }
+    }
+
+    /// No less than the squared distance of `point` from any point in a box.
+    #[inline(always)]
+    pub(super) fn farthest_squared(&self, point: DVec3, i: usize) -> f64 {
+        let pad = self.pad.max(MARGIN * point.abs().max_element());
+        let far = |k: usize| (self.max[k][i] - point[k]).abs().max((point[k] - self.min[k][i]).abs()) + pad;
+        (far(0) * far(0) + far(1) * far(1) + far(2) * far(2)) * (1.0 + MARGIN)
+    }
+
     /// No more than the squared distance of `point` from anything in each box.
     #[inline(always)]
     pub(super) fn distances_squared(&self, point: DVec3) -> [f64; N] {
@@ -102,141 +118,89 @@ impl Meets for Slabs {
     }
 }
 
-/// The binary top level.
-pub(super) struct Top<'a> {
-    nodes: &'a [TopNode2],
-    /// Of the children of each node; of a leaf twice its own.
-    boxes: Vec<Boxes<2>>,
+/// The geometry of a brick.
+pub(super) struct Geometry<'a> {
+    pub(super) view: BrickView<'a>,
+    /// In its object's units.
+    pub(super) origin: DVec3,
+    /// Object units of a device unit.
+    pub(super) unit: f64,
+    /// Device units of an object unit.
+    pub(super) per_unit: f64,
+    /// Object units of a step of the lattice.
+    pub(super) step: f64,
+    /// Greatest magnitude of a component of its origin.
+    pub(super) reach: f64,
+    /// Its greatest coordinates, in its object's units.
+    far: DVec3,
 }
 
-impl<'a> Top<'a> {
-    pub(super) fn new(resident: &'a Resident) -> Self {
-        let step = f64::from(resident.objects[0].step_log2).exp2();
-        let nodes = &resident.top2;
-        let boxes = |node: &TopNode2| {
-            let of = match node.right {
-                TOP_LEAF => [node; 2],
-                right => [node.left, right].map(|child| &nodes[child as usize]),
-            };
-            let min = std::array::from_fn(|k| of.map(|node| node.min[k] as f64 * step));
-            let max = std::array::from_fn(|k| of.map(|node| node.max[k] as f64 * step));
-            Boxes { min, max, pad: MARGIN * reach(&min).max(reach(&max)) }
-        };
-        Self { nodes, boxes: nodes.iter().map(boxes).collect() }
-    }
-
-    /// Whether there is nothing.
-    pub(super) fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
-    }
-
-    /// The boxes of a node's children; of a leaf twice its own.
-    pub(super) fn boxes(&self, node: u32) -> &Boxes<2> {
-        &self.boxes[node as usize]
-    }
-
-    /// The leaf that a node is, or its children.
-    pub(super) fn below(&self, node: u32) -> Result<u32, [u32; 2]> {
-        let TopNode2 { left, right, .. } = self.nodes[node as usize];
-        if right == TOP_LEAF { Ok(left) } else { Err([left, right]) }
-    }
-
-    /// Of each node, whether there is a leaf below it for which `has` holds.
-    pub(super) fn marked(&self, has: impl Fn(u32) -> bool) -> Vec<bool> {
-        let mut marks = vec![false; self.nodes.len()];
-        // Children follow their parent.
-        for node in (0..self.nodes.len() as u32).rev() {
-            marks[node as usize] = match self.below(node) {
-                Ok(leaf) => has(leaf),
-                Err(children) => children.iter().any(|&child| marks[child as usize]),
-            };
-        }
-        marks
-    }
-
-    /// Calls `visit` for the leaves below marked nodes whose boxes, and those above them, `what` may meet. `open` is
-    /// room to work in.
-    pub(super) fn leaves(&self, marks: &[bool], what: &impl Meets, open: &mut Vec<u32>, mut visit: impl FnMut(u32)) {
-        open.clear();
-        if marks.first() == Some(&true) {
-            open.push(0);
-        }
-        while let Some(node) = open.pop() {
-            let met = what.meets(self.boxes(node));
-            match self.below(node) {
-                Ok(leaf) if met != 0 => visit(leaf),
-                Ok(_) => (),
-                Err(children) => {
-                    for (side, child) in children.into_iter().enumerate() {
-                        if met & 1 << side != 0 && marks[child as usize] {
-                            open.push(child);
-                        }
-                    }
-                }
-            }
+impl<'a> Geometry<'a> {
+    /// Of a brick whose geometry is `bytes`; `opacity` as of [`BrickView::new`].
+    pub(super) fn new(resident: &Resident, brick: u32, bytes: &'a [u8], opacity: &'a [[u32; 4]]) -> Self {
+        let brick: &Brick = &resident.bricks[brick as usize];
+        let object = &resident.objects[brick.object as usize];
+        let [step, unit] = [object.step_log2, object.unit_log2].map(|log2| f64::from(log2).exp2());
+        let far = |k: usize| (brick.min[k].unsigned_abs().max(brick.max[k].unsigned_abs())) as f64 * step;
+        let origin = DVec3::from_array(brick.origin.map(|x| x as f64)) * step;
+        Self {
+            view: BrickView::new(brick, bytes, opacity),
+            origin,
+            unit,
+            per_unit: 1.0 / unit,
+            step,
+            reach: origin.abs().max_element(),
+            far: DVec3::new(far(0), far(1), far(2)),
         }
     }
-}
-
-/// The greatest of coordinates.
-fn reach<const N: usize>(axes: &[[f64; N]; 3]) -> f64 {
-    axes.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()))
 }
 
 /// A brick where an instance has it.
 pub(super) struct Placed<'a> {
-    view: BrickView<'a>,
+    pub(super) geometry: &'a Geometry<'a>,
     /// Global id of the instance's triangle 0.
     base: u32,
-    /// Of the brick, in the object's units.
-    origin: DVec3,
-    /// Object units of a device unit.
-    unit: f64,
-    /// By how much its boxes are grown.
-    pad: f64,
     /// `None`: the world's own.
-    matrix: Option<&'a [f64; 12]>,
+    pub(super) matrix: Option<&'a [f64; 12]>,
     /// -1 where the instance is a mirror image, else 1.
     pub(super) handedness: i32,
 }
 
 impl<'a> Placed<'a> {
     /// A leaf of the top level, of whose brick `geometry` is.
-    pub(super) fn new(resident: &'a Resident, leaf: u32, geometry: &'a [u8]) -> Self {
-        let leaf = resident.leaves[leaf as usize];
-        let (brick, instance): (&Brick, &Instance) =
-            (&resident.bricks[leaf.brick as usize], &resident.instances[leaf.instance as usize]);
-        let object = &resident.objects[brick.object as usize];
-        let [step, unit] = [object.step_log2, object.unit_log2].map(|log2| f64::from(log2).exp2());
-        let view = BrickView::new(brick, geometry, &[]);
+    #[inline(always)]
+    pub(super) fn new(resident: &'a Resident, leaf: u32, geometry: &'a Geometry<'a>) -> Self {
+        let instance: &Instance = &resident.instances[resident.leaves[leaf as usize].instance as usize];
         let matrix = (instance.flags & INSTANCE_IDENTITY == 0).then_some(&instance.world_from_object);
-        let far = |k: usize| (brick.min[k].unsigned_abs().max(brick.max[k].unsigned_abs())) as f64 * step;
-        let terms =
-            |m: &[f64; 12], k: usize| (0..3).map(|j| m[4 * k + j].abs() * far(j)).sum::<f64>() + m[4 * k + 3].abs();
+        let handedness = if instance.flags & INSTANCE_MIRRORED != 0 { -1 } else { 1 };
+        Self { geometry, base: instance.base, matrix, handedness }
+    }
+
+    /// By how much its boxes are grown.
+    #[inline(always)]
+    fn pad(&self) -> f64 {
+        let far = self.geometry.far;
+        let Some(m) = self.matrix else { return MARGIN * far.max_element() };
         // What the rows of a matrix add up is rounded by its terms, not by their sum.
-        let reach = (0..3).map(|k| matrix.map_or_else(|| far(k), |m| terms(m, k))).fold(0.0, f64::max);
-        Self {
-            view,
-            base: instance.base,
-            origin: DVec3::from_array(brick.origin.map(|x| x as f64)) * step,
-            unit,
-            pad: MARGIN * reach,
-            matrix,
-            handedness: if instance.flags & INSTANCE_MIRRORED != 0 { -1 } else { 1 },
-        }
+        let terms = |k: usize| {
+            (m[4 * k] * far.x).abs() + (m[4 * k + 1] * far.y).abs() + (m[4 * k + 2] * far.z).abs() + m[4 * k + 3].abs()
+        };
+        MARGIN * terms(0).max(terms(1)).max(terms(2))
     }
 
     /// The global id of a triangle.
+    #[inline(always)]
     pub(super) fn id(&self, triangle: u32) -> u32 {
-        self.base.wrapping_add(self.view.ids[triangle as usize])
+        self.base.wrapping_add(self.geometry.view.ids[triangle as usize])
     }
 
     /// The vertices of a triangle as they are stored, world units. Triangles of an instance that share a vertex have
     /// the same numbers for it, whatever brick they lie in.
     #[inline(always)]
     pub(super) fn vertices(&self, triangle: u32) -> [DVec3; 3] {
-        let [a, b, c] = self.view.corners(triangle);
-        let at = |corner: [f64; 3]| self.world(self.origin + DVec3::from_array(corner) * self.unit);
+        let &Geometry { origin, unit, ref view, .. } = self.geometry;
+        let [a, b, c] = view.corners(triangle);
+        let at = |corner: [f64; 3]| self.world(origin + DVec3::from_array(corner) * unit);
         [at(a), at(b), at(c)]
     }
 
@@ -249,17 +213,18 @@ impl<'a> Placed<'a> {
 
     /// The world's boxes of what the children of a node hold.
     #[inline(always)]
-    fn boxes(&self, node: &Node) -> Boxes<8> {
-        let scale = |k: usize| f64::from_bits((u64::from(node.exponent[k]) + 1023 - 127) << 52) * self.unit;
+    fn boxes(&self, node: &Node, pad: f64) -> Boxes<8> {
+        let &Geometry { origin: from, unit, .. } = self.geometry;
+        let scale = |k: usize| f64::from_bits((u64::from(node.exponent[k]) + 1023 - 127) << 52) * unit;
         let grid = |bounds: &[[u8; 8]; 3]| -> [[f64; 8]; 3] {
             std::array::from_fn(|k| {
-                let (origin, scale) = (self.origin[k] + f64::from(node.origin[k]) * self.unit, scale(k));
+                let (origin, scale) = (from[k] + f64::from(node.origin[k]) * unit, scale(k));
                 bounds[k].map(|q| origin + f64::from(q) * scale)
             })
         };
         let (min, max) = (grid(&node.lo), grid(&node.hi));
-        let Some(m) = self.matrix else { return Boxes { min, max, pad: self.pad } };
-        let mut own = Boxes { min, max, pad: self.pad };
+        let Some(m) = self.matrix else { return Boxes { min, max, pad } };
+        let mut own = Boxes { min, max, pad };
         for k in 0..3 {
             let row = [m[4 * k], m[4 * k + 1], m[4 * k + 2]];
             for i in 0..8 {
@@ -278,11 +243,12 @@ impl<'a> Placed<'a> {
     /// `open` is room to work in.
     #[inline(always)]
     pub(super) fn walk(&self, what: &impl Meets, open: &mut Vec<u32>, mut visit: impl FnMut(u32) -> bool) {
+        let pad = self.pad();
         open.clear();
         open.push(0);
         while let Some(index) = open.pop() {
-            let node = &self.view.nodes[index as usize];
-            let mut met = what.meets(&self.boxes(node)) & children(node);
+            let node = &self.geometry.view.nodes[index as usize];
+            let mut met = what.meets(&self.boxes(node, pad)) & children(node);
             while met != 0 {
                 let slot = met.trailing_zeros() as usize;
                 met &= met - 1;
@@ -308,6 +274,7 @@ impl<'a> Placed<'a> {
         open: &mut Vec<(f64, Child)>,
         mut visit: impl FnMut(u32) -> f64,
     ) {
+        let pad = self.pad();
         open.clear();
         open.push((0.0, Child::Node(0)));
         while let Some((distance, next)) = open.pop() {
@@ -317,13 +284,15 @@ impl<'a> Placed<'a> {
             let index = match next {
                 Child::Node(index) => index,
                 Child::Triangles(first, count) => {
-                    within = (first..first + count).fold(within, |within, triangle| visit(triangle).min(within));
+                    for triangle in first..first + count {
+                        within = visit(triangle).min(within);
+                    }
                     continue;
                 }
             };
-            let node = &self.view.nodes[index as usize];
+            let node = &self.geometry.view.nodes[index as usize];
             let before = open.len();
-            let distances = self.boxes(node).distances_squared(point);
+            let distances = self.boxes(node, pad).distances_squared(point);
             let mut left = children(node);
             while left != 0 {
                 let slot = left.trailing_zeros() as usize;
@@ -332,8 +301,7 @@ impl<'a> Placed<'a> {
                     open.push((distances[slot], child(node, slot)));
                 }
             }
-            // The nearest last, on top.
-            open[before..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+            nearest_on_top(&mut open[before..]);
         }
     }
 }
@@ -347,7 +315,7 @@ pub(super) enum Child {
 
 /// The slots of a node that have a child, a bit each.
 #[inline(always)]
-fn children(node: &Node) -> u32 {
+pub(super) fn children(node: &Node) -> u32 {
     (0..8).fold(0, |mask, slot| mask | u32::from(node.meta[slot] != 0) << slot)
 }
 

@@ -1,30 +1,15 @@
 //! Payloads of bricks in host memory: each is read and checked by workers, and stays while there is room.
 
-use crate::stream::{Destination, HostCache, Item, Workers};
+use crate::stream::{HostCache, Item, Shared, Workers};
 use anyhow::{Result, anyhow};
 use bricks::SceneFile;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Least bytes that payloads in use may take together, whatever the budget.
-const LEAST_BATCH: u64 = 4 << 20;
-
-/// A payload that a worker brings.
-#[derive(Default)]
-struct Held(Option<Arc<[u8]>>);
-
-impl Destination for Held {
-    const SHARES: bool = true;
-
-    fn fill(&mut self, bytes: &[u8]) {
-        self.share(Arc::from(bytes));
-    }
-
-    fn share(&mut self, payload: Arc<[u8]>) {
-        self.0 = Some(payload);
-    }
-}
+/// Least bytes that payloads in use may take together, whatever the budget; in tests so few that small scenes come in
+/// parts.
+const LEAST_BATCH: u64 = if cfg!(test) { 64 << 10 } else { 4 << 20 };
 
 /// Payloads of a scene, through a cache.
 pub(super) struct Store {
@@ -50,10 +35,30 @@ impl Store {
         self.scene.loaded_bytes(item.into())
     }
 
+    /// A payload, if the cache has it.
+    pub(super) fn at_hand(&self, item: Item) -> Option<Arc<[u8]>> {
+        self.workers.host_cache().get(item)
+    }
+
+    /// Bytes that the cache keeps together.
+    fn room(&self) -> u64 {
+        self.kept_bytes.max(self.batch_bytes)
+    }
+
+    /// How many of `items`, from the first on, are kept together; one at least.
+    pub(super) fn together(&self, items: &[Item]) -> usize {
+        let mut sum = 0;
+        let fits = |item: &&Item| {
+            sum += self.bytes(**item);
+            sum <= self.room()
+        };
+        items.iter().take_while(fits).count().max(1).min(items.len())
+    }
+
     /// Bricks by runs whose geometry the cache keeps together, in the order of the file.
     pub(super) fn runs(&self) -> Vec<Range<u32>> {
         let count = self.scene.resident().exact_bricks() as u32;
-        let room = self.kept_bytes.max(self.batch_bytes);
+        let room = self.room();
         let (mut runs, mut first, mut sum) = (Vec::new(), 0, 0);
         for brick in 0..count {
             let bytes = self.bytes(Item::geometry(brick));
@@ -86,7 +91,7 @@ impl Store {
                 sum += self.bytes(items[end]);
                 end += 1;
             }
-            let requests = items[first..end].iter().map(|&item| (item, Held::default())).collect();
+            let requests = items[first..end].iter().map(|&item| (item, Shared::default())).collect();
             let loaded = self.workers.load(requests)?;
             let held = loaded.into_iter().map(|(item, held)| held.0.ok_or_else(|| anyhow!("{item}: no payload")));
             let held = held.collect::<Result<Vec<_>>>()?;

@@ -4,10 +4,13 @@
 //! a time, and are sorted by the bricks that they enter. So a batch reads a brick once, however many items enter it, if
 //! the cache has 8 MiB or more. Memory does not grow with the batch.
 
-use super::space::{Meets, Placed, Top};
+use super::room::Room;
+use super::space::{Geometry, Meets, Placed};
 use super::{Queries, Watch};
+use crate::kernels::simd::isa::{Best, Isa, Work};
 use crate::stream::Item;
 use anyhow::Result;
+use bricks::Resident;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -29,19 +32,47 @@ pub(super) trait Sweep: Sync {
     /// An item, as boxes are asked; `None`: it has its answer.
     fn asks(&self, item: usize) -> Option<Self::Asks>;
 
-    /// Notes what an item meets in a leaf. `open` is room to work in.
-    fn meet(&self, item: usize, leaf: u32, brick: &Placed, open: &mut Vec<u32>, found: &mut Vec<Self::Found>);
+    /// Notes what an item meets in a leaf. Implementations are always inlined.
+    fn meet<I: Isa>(&self, isa: I, item: usize, at: (u32, &Placed), room: &mut Room, found: &mut Vec<Self::Found>);
+}
+
+/// Items that meet leaves of one brick.
+struct Task<'a, S> {
+    sweep: &'a S,
+    /// The number of the pairs' first item.
+    first: usize,
+    resident: &'a Resident,
+    geometry: &'a Geometry<'a>,
+    pairs: &'a [Pair],
+}
+
+impl<S: Sweep> Work for Task<'_, S> {
+    type Out = Vec<S::Found>;
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) -> Vec<S::Found> {
+        let (mut found, mut room) = (Vec::new(), Room::default());
+        for of_leaf in self.pairs.chunk_by(|a, b| a.leaf == b.leaf) {
+            let leaf = of_leaf[0].leaf;
+            let brick = Placed::new(self.resident, leaf, self.geometry);
+            for pair in of_leaf {
+                let item = self.first + pair.item as usize;
+                self.sweep.meet(isa, item, (leaf, &brick), &mut room, &mut found);
+            }
+        }
+        found
+    }
 }
 
 /// An item and a leaf that it is to meet, in the order in which they are taken.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Pair {
+struct Pair {
     /// The brick of the leaf.
-    pub(super) brick: u32,
+    brick: u32,
     /// The leaf.
-    pub(super) leaf: u32,
+    leaf: u32,
     /// The item's number among those that are taken together.
-    pub(super) item: u32,
+    item: u32,
 }
 
 impl Queries {
@@ -57,7 +88,7 @@ impl Queries {
         watch: &mut Watch,
     ) -> Result<()> {
         let resident = self.scene.resident();
-        let top = Top::new(resident);
+        let top = self.top();
         let runs = self.store.runs();
         let (mut done, mut told) = (0u64, 0u64);
         for run in &runs {
@@ -69,7 +100,9 @@ impl Queries {
                     if let Some(asks) = sweep.asks(item) {
                         top.leaves(&marks, &asks, &mut open, |leaf| {
                             let brick = resident.leaves[leaf as usize].brick;
-                            pairs.push(Pair { brick, leaf, item: (item - first) as u32 });
+                            if run.contains(&brick) {
+                                pairs.push(Pair { brick, leaf, item: (item - first) as u32 });
+                            }
                         });
                     }
                     (pairs, open)
@@ -80,12 +113,7 @@ impl Queries {
                     pairs.par_sort_unstable();
                     pairs
                 });
-                self.at_leaves(
-                    &pairs,
-                    |item, leaf, brick, open, found| sweep.meet(first + item as usize, leaf, brick, open, found),
-                    take,
-                    watch,
-                )?;
+                self.at_leaves(&pairs, sweep, first, take, watch)?;
                 let each = (pairs.len() / (end - first)).max(1);
                 done += (end - first) as u64;
                 let all = done / runs.len() as u64;
@@ -98,38 +126,28 @@ impl Queries {
         watch(count as u64 - told)
     }
 
-    /// Calls `meet` for sorted pairs, with room to work in and a list for what it finds, on all threads. Then hands
-    /// what was found to `take`, in the order of pairs. Each brick is read once.
-    ///
-    /// # Errors
-    /// A damaged brick; what `watch` says.
-    pub(super) fn at_leaves<O: Default, F: Send>(
+    /// Has the items of sorted pairs, the first of which is `first`, meet their leaves on all threads, and hands what
+    /// they find to `take`, in the order of pairs. Each brick is read once.
+    fn at_leaves<S: Sweep>(
         &self,
         pairs: &[Pair],
-        meet: impl Fn(u32, u32, &Placed, &mut O, &mut Vec<F>) + Sync,
-        take: &mut dyn FnMut(F),
+        sweep: &S,
+        first: usize,
+        take: &mut dyn FnMut(S::Found),
         watch: &mut Watch,
     ) -> Result<()> {
-        let resident = self.scene.resident();
+        let (resident, isa) = (self.scene.resident(), Best::detect());
         let groups: Vec<&[Pair]> = pairs.chunk_by(|a, b| a.brick == b.brick).collect();
         let items: Vec<Item> = groups.iter().map(|group| Item::geometry(group[0].brick)).collect();
         self.store.for_each(&items, |place, payloads| {
-            let task = |(pairs, payload): (&[Pair], &Arc<[u8]>)| {
-                let (mut found, mut open) = (Vec::new(), O::default());
-                for of_leaf in pairs.chunk_by(|a, b| a.leaf == b.leaf) {
-                    let leaf = of_leaf[0].leaf;
-                    let brick = Placed::new(resident, leaf, payload);
-                    for pair in of_leaf {
-                        meet(pair.item, leaf, &brick, &mut open, &mut found);
-                    }
-                }
-                found
+            let of_group = |(payload, group): (&Arc<[u8]>, &&[Pair])| -> Vec<Vec<S::Found>> {
+                let geometry = Geometry::new(resident, group[0].brick, payload, &[]);
+                let task = |pairs| isa.run(Task { sweep, first, resident, geometry: &geometry, pairs });
+                group.par_chunks(TASK).map(task).collect()
             };
-            let found: Vec<Vec<F>> = self.threads.install(|| {
-                let of_payloads = payloads.par_iter().zip(&groups[place..place + payloads.len()]);
-                let tasks = of_payloads.flat_map(|(payload, group)| group.par_chunks(TASK).map(move |p| (p, payload)));
-                tasks.map(task).collect()
-            });
+            let groups = &groups[place..place + payloads.len()];
+            let found: Vec<_> =
+                self.threads.install(|| payloads.par_iter().zip(groups).flat_map_iter(of_group).collect());
             found.into_iter().flatten().for_each(&mut *take);
             watch(0)
         })

@@ -1,10 +1,12 @@
 //! Queries against brute force over the triangles as truth decodes them, and against closed forms.
 
 use super::*;
+use crate::kernels::layout::NONE;
 use crate::math::crossing::crossing;
 use crate::math::random::Rng;
 use crate::output::npy::Ray;
 use crate::reference::{Truth, TruthRay};
+use crate::settings::CacheSize;
 use bricks::SceneFile;
 use brickwalk_convert::build::{BuildSettings, LatticeStep, build};
 use brickwalk_convert::progress::Progress;
@@ -129,7 +131,7 @@ fn all_that_rays_meet_is_what_brute_force_finds() {
     for (brick_triangles, cache) in [(1 << 14, 64 << 20), (128, 64 << 20), (128, 0)] {
         let (_folder, file) = convert(all_spheres(), brick_triangles);
         let truth = Truth::load(&file).unwrap();
-        let queries = Queries::new(file, cache, 2).unwrap();
+        let queries = Queries::new(file, CacheSize::Bytes(cache), 2).unwrap();
         let found = queries.list_intersections(&rays, &mut |_| Ok(())).unwrap();
         let counts = queries.count_intersections(&rays, &mut |_| Ok(())).unwrap();
         for (number, ray) in rays.iter().enumerate() {
@@ -151,6 +153,166 @@ fn all_that_rays_meet_is_what_brute_force_finds() {
     assert!(lists[0].hits.len() > 600, "{}", lists[0].hits.len());
     let most = lists[0].starts.windows(2).map(|pair| pair[1] - pair[0]).max();
     assert!(most > Some(20), "the pole is met: {most:?}");
+}
+
+/// What brute force finds first.
+fn first(truth: &Truth, ray: &Ray) -> Option<(f64, u32)> {
+    brute(truth, ray).first().copied()
+}
+
+fn met(hit: &Hit) -> Option<(f64, u32)> {
+    (hit.triangle != NONE).then_some((hit.t, hit.triangle))
+}
+
+#[test]
+fn the_closest_hit_is_what_brute_force_finds() {
+    let mut rays = rays(900);
+    // From far away, where f64 knows less of them than a step of the lattice.
+    let from_afar = |ray: &Ray| {
+        let origin = [0, 1, 2].map(|k| ray.origin[k] - 1e9 * ray.direction[k]);
+        Ray { origin, t_min: 0.0, t_max: f64::INFINITY, ..*ray }
+    };
+    rays.extend(rays[..60].to_vec().iter().map(from_afar));
+    let mut expected: Vec<Option<(f64, u32)>> = Vec::new();
+    let mut all = Vec::new();
+    for (brick_triangles, cache, threads) in [(1 << 14, 64 << 20, 1), (128, 64 << 20, 2), (128, 0, 2), (64, 0, 1)] {
+        let (_folder, file) = convert(all_spheres(), brick_triangles);
+        let truth = Truth::load(&file).unwrap();
+        if expected.is_empty() {
+            expected = rays.iter().map(|ray| first(&truth, ray)).collect();
+        }
+        let queries = Queries::new(file, CacheSize::Bytes(cache), threads).unwrap();
+        let hits = queries.cast(&rays, &mut |_| Ok(())).unwrap();
+        let any = queries.any(&rays, &mut |_| Ok(())).unwrap();
+        let mut told = 0;
+        for (number, ray) in rays.iter().enumerate() {
+            let own = met(&hits[number]);
+            assert_eq!(own, expected[number], "ray {number} {ray:?}");
+            assert_eq!(any[number], own.is_some(), "ray {number}");
+            if let Some((t, id)) = own {
+                let [a, b, c] = truth.vertices(id).unwrap().map(DVec3::from_array);
+                let normal = DVec3::from_array(hits[number].normal.map(f64::from));
+                assert!((normal - (b - a).cross(c - a).normalize()).length() < 1e-6);
+                let given = TruthRay::new(ray.origin, ray.direction, ray.t_min.max(0.0), ray.t_max);
+                let expected = if number % 8 == 0 { truth.closest(&given) } else { None };
+                if let Some(truth) = expected.filter(|truth| truth.id == id) {
+                    assert_eq!(t, truth.t);
+                    let [u, v] = [hits[number].u, hits[number].v].map(f64::from);
+                    assert!((u - truth.u).abs() < 1e-6 && (v - truth.v).abs() < 1e-6, "ray {number}");
+                    told += 1;
+                }
+            }
+        }
+        assert!(told > rays.len() / 24, "{told}");
+        all.push(hits);
+    }
+    assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "bricks, caches and threads do not show");
+    let hits = all[0].iter().filter(|hit| hit.triangle != NONE).count();
+    assert!((rays.len() / 3..rays.len() * 9 / 10).contains(&hits), "{hits}");
+}
+
+#[test]
+fn instances_that_f32_does_not_know_are_asked_in_f64() {
+    // A sphere that is a disc of a thousandth of a millionth of its radius, one that is as small as a step of its own
+    // lattice where it lies, and one that is plain.
+    let places = [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 1e-9, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        [1e-7, 0.0, 0.0, 900.0, 0.0, 1e-7, 0.0, 1e5, 0.0, 0.0, 1e-7, -3e4],
+        PLACES[0],
+    ];
+    let (_folder, file) = convert(spheres(&places, 0), 128);
+    let truth = Truth::load(&file).unwrap();
+    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
+    let mut rng = Rng(11);
+    let centers = [DVec3::ZERO, DVec3::new(900.0, 1e5, -3e4), CENTERS[1]];
+    let rays: Vec<Ray> = (0..900)
+        .map(|i| {
+            let center = centers[i % 3];
+            let size = [1.0, 1e-7, 1.0][i % 3];
+            let (from, to) = (center + 4.0 * in_ball(&mut rng), center + size * in_ball(&mut rng));
+            Ray { origin: from.to_array(), direction: (to - from).to_array(), t_min: 0.0, t_max: f64::INFINITY }
+        })
+        .collect();
+    let hits = queries.cast(&rays, &mut |_| Ok(())).unwrap();
+    let counts = queries.count_intersections(&rays, &mut |_| Ok(())).unwrap();
+    for (number, ray) in rays.iter().enumerate() {
+        let truth = brute(&truth, ray);
+        assert_eq!(met(&hits[number]), truth.first().copied(), "ray {number} {ray:?}");
+        assert_eq!(counts[number] as usize, truth.len(), "ray {number}");
+    }
+    let met = |which: usize| hits.iter().skip(which).step_by(3).filter(|hit| hit.triangle != NONE).count();
+    assert!([0, 1, 2].iter().all(|&which| met(which) > 100), "{:?}", [0, 1, 2].map(met));
+}
+
+#[test]
+fn rays_pass_through_what_is_cut_out() {
+    let mut source = all_spheres();
+    source.meshes.push(sphere(12, 0));
+    source.placements.push(Placement {
+        mesh: 1,
+        world_from_mesh: [3.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 3.0, 0.0],
+        ..Placement::default()
+    });
+    source.meshes[1].primitives[0].material = 1;
+    let masked = bricks::Material {
+        flags: bricks::MATERIAL_MASK,
+        base_color: [1.0, 1.0, 1.0, 0.25],
+        alpha_cutoff: 0.5,
+        ..bricks::Material::DIFFUSE
+    };
+    source.materials.push(masked);
+    let rays = rays(400);
+    let (_folder, file) = convert(source.clone(), 128);
+    let truth = Truth::load(&file).unwrap();
+    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
+    let hits = queries.cast(&rays, &mut |_| Ok(())).unwrap();
+    for (number, ray) in rays.iter().enumerate() {
+        let truth = truth.closest(&TruthRay::new(ray.origin, ray.direction, ray.t_min.max(0.0), ray.t_max));
+        assert_eq!(met(&hits[number]), truth.map(|hit| (hit.t, hit.id)), "ray {number}");
+    }
+    let listed = queries.list_intersections(&rays, &mut |_| Ok(())).unwrap();
+    let differ = (0..rays.len()).filter(|&number| {
+        let own = listed.hits[listed.starts[number] as usize..listed.starts[number + 1] as usize].first();
+        own.and_then(met) != met(&hits[number])
+    });
+    assert!(differ.count() > 100, "the control: as geometry the sphere is there");
+    // Blended, some rays pass and some do not, and the same ones whatever is asked beside.
+    source.materials[1] =
+        bricks::Material { flags: bricks::MATERIAL_BLEND, base_color: [1.0, 1.0, 1.0, 0.5], ..masked };
+    let (_folder, file) = convert(source, 128);
+    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
+    let blended = queries.cast(&rays, &mut |_| Ok(())).unwrap();
+    let own = |hits: &[Hit]| (0..rays.len()).filter(|&i| hits[i].triangle != blended[i].triangle).count();
+    let whole: Vec<Hit> =
+        (0..rays.len()).map(|i| listed.hits.get(listed.starts[i] as usize).copied().unwrap_or(hits[i])).collect();
+    assert!(own(&hits) > 50 && own(&whole) > 50, "{} {}", own(&hits), own(&whole));
+    assert_eq!(queries.cast(&rays[200..], &mut |_| Ok(())).unwrap(), blended[200..]);
+}
+
+#[test]
+fn of_a_batch_no_brick_is_read_twice_and_none_that_is_not_needed() {
+    let (_folder, file) = convert(all_spheres(), 64);
+    let bricks = file.resident().exact_bricks() as u64;
+    let read = |rays: &[Ray], cache: u64| {
+        let queries = Queries::new(file.clone(), CacheSize::Bytes(cache), 2).unwrap();
+        queries.any(rays, &mut |_| Ok(())).unwrap();
+        queries.stats().payloads_read
+    };
+    let rays = rays(2000);
+    let all = read(&rays, 0);
+    assert!(all > bricks / 2 && all <= bricks, "{all} of {bricks}");
+    // A bundle that meets one side of the first sphere.
+    let bundle: Vec<Ray> = (0..100u32)
+        .map(|i| {
+            let at = |i: u32| 0.001 * f64::from(i);
+            let origin = [at(i % 10), 5.0, at(i / 10)];
+            Ray { origin, direction: [0.0, -1.0, 0.0], t_min: 0.0, t_max: f64::INFINITY }
+        })
+        .collect();
+    let few = read(&bundle, 0);
+    assert!(few <= 4, "{few}");
+    let both: Vec<Ray> = bundle.iter().map(|ray| Ray { t_min: 4.5, ..*ray }).collect();
+    assert!(read(&both, 0) > 0, "the control: the other side is there");
 }
 
 /// The nearest point of a triangle by regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
@@ -193,7 +355,7 @@ fn the_nearest_point_is_what_brute_force_finds() {
     for (brick_triangles, cache) in [(1 << 14, 64 << 20), (128, 0)] {
         let (_folder, file) = convert(all_spheres(), brick_triangles);
         let truth = Truth::load(&file).unwrap();
-        let queries = Queries::new(file, cache, 2).unwrap();
+        let queries = Queries::new(file, CacheSize::Bytes(cache), 2).unwrap();
         let found = queries.closest_points(&points, &mut |_| Ok(())).unwrap();
         for (point, found) in points.iter().zip(&found) {
             let p = DVec3::from_array(*point);
@@ -221,7 +383,7 @@ fn the_nearest_point_is_what_brute_force_finds() {
 #[test]
 fn points_inside_are_those_of_the_spheres() {
     let (_folder, file) = convert(all_spheres(), 128);
-    let queries = Queries::new(file, 0, 2).unwrap();
+    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
     assert!(queries.surfaces().unwrap().iter().all(|surface| surface.is_turned));
     let points = points(3000);
     let inside = queries.occupancy(&points, false, &mut |_| Ok(())).unwrap();
@@ -248,7 +410,7 @@ fn points_inside_are_those_of_the_spheres() {
 #[test]
 fn open_surfaces_have_no_inside() {
     let (_folder, file) = convert(spheres(&[IDENTITY], 1), 128);
-    let queries = Queries::new(file, 0, 1).unwrap();
+    let queries = Queries::new(file, CacheSize::Bytes(0), 1).unwrap();
     assert!(!queries.surfaces().unwrap()[0].is_closed);
     let error = queries.occupancy(&[[0.0; 3]], false, &mut |_| Ok(())).unwrap_err().to_string();
     assert!(error.contains("scene.bricks: its surface is not closed"), "{error}");
@@ -258,7 +420,7 @@ fn open_surfaces_have_no_inside() {
 #[test]
 fn what_lies_between_hides() {
     let (_folder, file) = convert(spheres(&[IDENTITY], 0), 128);
-    let queries = Queries::new(file.clone(), 0, 2).unwrap();
+    let queries = Queries::new(file.clone(), CacheSize::Bytes(0), 2).unwrap();
     let from = [[-3.0, 0.1, 0.2], [-3.0, 0.1, 0.2], [-3.0, 2.0, 0.0], [-3.0, 0.1, 0.2], [0.0, 0.0, 0.0]];
     let to = [[3.0, 0.1, 0.2], [-2.0, 0.1, 0.2], [3.0, 2.0, 0.0], [-3.0, 0.1, 0.2], [0.5, 0.0, 0.0]];
     let free = queries.visibility(&from, &to, &mut |_| Ok(())).unwrap();
@@ -275,7 +437,7 @@ fn what_lies_between_hides() {
 #[test]
 fn bad_input_is_named_and_work_can_be_stopped() {
     let (_folder, file) = convert(spheres(&[IDENTITY], 0), 128);
-    let queries = Queries::new(file, 0, 1).unwrap();
+    let queries = Queries::new(file, CacheSize::Bytes(0), 1).unwrap();
     let text = |error: anyhow::Error| format!("{error:#}");
     let error = queries.closest_points(&[[0.0; 3], [0.0, f64::NAN, 0.0]], &mut |_| Ok(())).unwrap_err();
     assert!(text(error).starts_with("point 1: [0.0, NaN, 0.0] is not finite"));
@@ -302,12 +464,12 @@ fn bad_input_is_named_and_work_can_be_stopped() {
 fn nothing_is_asked_for_twice_and_an_empty_scene_answers() {
     let (_folder, file) = convert(all_spheres(), 64);
     let bricks = file.resident().exact_bricks() as u64;
-    let queries = Queries::new(file, 64 << 20, 2).unwrap();
+    let queries = Queries::new(file, CacheSize::Bytes(64 << 20), 2).unwrap();
     queries.count_intersections(&rays(400), &mut |_| Ok(())).unwrap();
     let read = queries.stats().payloads_read;
     assert!(read > bricks / 2 && read <= bricks, "{read} of {bricks}");
     let (_folder, file) = convert(SourceScene { meshes: vec![], placements: vec![], ..all_spheres() }, 64);
-    let queries = Queries::new(file, 0, 1).unwrap();
+    let queries = Queries::new(file, CacheSize::Bytes(0), 1).unwrap();
     let ray = Ray { origin: [0.0; 3], direction: [1.0, 0.0, 0.0], t_min: 0.0, t_max: 1.0 };
     assert_eq!(queries.count_intersections(&[ray], &mut |_| Ok(())).unwrap(), [0]);
     assert_eq!(queries.closest_points(&[[0.0; 3]], &mut |_| Ok(())).unwrap()[0].distance, f64::INFINITY);

@@ -123,6 +123,11 @@ impl Session {
         Ok(Some(Frame { number: 0, size, pixels, records, checkpoints: Vec::new(), exposure_ev: stops, tone_map }))
     }
 
+    /// The name of the device.
+    pub fn device(&self) -> String {
+        self.renderer.engine.executor.device().name
+    }
+
     /// Traces the secondary rays of one pixel in four from now on, and spreads what they bring, in pictures of one
     /// sample with AOVs; or all of them.
     pub fn set_half_rate(&mut self, is_half: bool) {

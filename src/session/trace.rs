@@ -3,7 +3,7 @@
 mod given;
 mod refine;
 
-pub use given::{Approach, DeviceRay, Scaled, approach, check, device_ray};
+pub use given::{Approach, DeviceRay, Scaled, Surroundings, check, device_ray};
 
 use super::opened::Opened;
 use crate::counters::Counters;
@@ -79,7 +79,8 @@ impl Opened {
 pub struct Found {
     /// The ray, of those given.
     pub ray: usize,
-    /// Distance in lengths of the given direction, of f32 accuracy, from the origin that [`approach`] gives.
+    /// Distance in lengths of the given direction, of f32 accuracy, from the origin that [`Surroundings::approach`]
+    /// gives.
     pub t: f64,
     /// Global triangle id.
     pub id: u32,
@@ -96,7 +97,8 @@ pub struct Found {
 ///
 /// Rays are rounded to f32 relative to a point near their origin, or near the scene if that is far away, and what they
 /// hit is decided so. `t` and the normal are then those of the given ray and the triangle in f64. The cone that levels
-/// are selected by starts where [`approach`] has the ray start: of a ray from far away it is narrower than it might be.
+/// are selected by starts where [`Surroundings::approach`] has it start: of a ray from far away it is narrower than it
+/// might be.
 ///
 /// # Errors
 /// A damaged brick, or the device's.
@@ -131,8 +133,12 @@ pub fn find(
     // One reference point a cell: the rounding of an origin depends on the ray alone, not on its neighbours in the
     // file.
     let mut groups: BTreeMap<[i64; 3], (Frame, Vec<usize>)> = BTreeMap::new();
+    let Some(surroundings) = Surroundings::new(traced.scene.resident()) else {
+        watch(rays.len() as u64);
+        return Ok((all, stats));
+    };
     for (i, ray) in rays.iter().enumerate() {
-        let Some(Approach { ray, .. }) = approach(traced.scene.resident(), ray) else {
+        let Some(Approach { ray, .. }) = surroundings.approach(ray) else {
             watch(1);
             continue;
         };
@@ -141,8 +147,7 @@ pub fn find(
     }
     for (frame, members) in groups.values() {
         for chunk in members.chunks(traced.most) {
-            let resident = traced.scene.resident();
-            let near = |&i: &usize| approach(resident, &rays[i]).map(|near| (i, device_ray(&near.ray, frame)));
+            let near = |&i: &usize| surroundings.approach(&rays[i]).map(|near| (i, device_ray(&near.ray, frame)));
             let (numbers, given): (Vec<usize>, Vec<DeviceRay>) = chunk.iter().filter_map(near).unzip();
             let found = trace_chunk(traced, frame, &given, any, &mut stats)?;
             for ((ray, given), found) in numbers.into_iter().zip(&given).zip(found) {

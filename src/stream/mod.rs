@@ -36,4 +36,4 @@ pub use residency::{Counters, KindCounters, NoRoom, Placed, Residency, Residency
 pub use sizes::Sizes;
 pub use source::{PayloadSource, SourceError};
 pub use trace::{PassRequests, Replay, ReplayResult, Trace, TraceError, replay};
-pub use workers::{Destination, Loaded, StreamError, Workers, WorkersStats};
+pub use workers::{Destination, Loaded, Shared, StreamError, Workers, WorkersStats};

@@ -31,6 +31,22 @@ pub trait Destination: Send + 'static {
     }
 }
 
+/// A place in host memory, shared with the host cache.
+#[derive(Default)]
+pub struct Shared(pub Option<Arc<[u8]>>);
+
+impl Destination for Shared {
+    const SHARES: bool = true;
+
+    fn fill(&mut self, bytes: &[u8]) {
+        self.share(Arc::from(bytes));
+    }
+
+    fn share(&mut self, payload: Arc<[u8]>) {
+        self.0 = Some(payload);
+    }
+}
+
 /// Why something was not loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum StreamError {

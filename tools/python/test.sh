@@ -19,7 +19,7 @@ if [ ! -x "$environment/bin/python" ]; then
     "$python" -m venv "$environment"
 fi
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check \
-    'maturin>=1.8,<2' numpy pytest hypothesis trimesh rtree scipy
+    'maturin>=1.8,<2' numpy pytest hypothesis trimesh rtree scipy pillow
 
 # Nothing that is built here goes into a debugger.
 export CARGO_PROFILE_RELEASE_DEBUG=false

@@ -60,24 +60,19 @@ impl OpacityView<'_> {
     }
 }
 
-impl BrickRay<'_> {
-    /// Whether the ray passes through a triangle of the brick that it meets at `h`.
+impl OpacityView<'_> {
+    /// Whether a ray passes through a triangle of the brick that it meets where `weights` says; `refracts`: bodies that
+    /// refract stop it. `drawn` is asked where that is left to chance.
     #[inline(always)]
-    pub fn passes(&self, triangle: u32, id: u32, h: &TriangleHit) -> bool {
-        !self.brick.opacity.of.is_empty() && self.passes_by_alpha(triangle, id, h)
-    }
-
-    fn passes_by_alpha(&self, triangle: u32, id: u32, h: &TriangleHit) -> bool {
-        let view = &self.brick.opacity;
-        let number = view.of[triangle as usize];
+    pub fn passes(&self, triangle: u32, weights: [f32; 3], refracts: bool, drawn: impl FnOnce() -> f32) -> bool {
+        let number = self.of[triangle as usize];
         if number == NONE {
             return false;
         }
-        let opacity = &view.triangles[number as usize];
-        let weights = [divide(h.u, h.det), divide(h.v, h.det), divide(h.w, h.det)];
+        let opacity = &self.triangles[number as usize];
         let at = 2 * opacity.material as usize;
-        let m: Opacity = bytemuck::cast([view.table[at], view.table[at + 1]]);
-        if m.blends & 2 != 0 && self.draw.refracts {
+        let m: Opacity = bytemuck::cast([self.table[at], self.table[at + 1]]);
+        if m.blends & 2 != 0 && refracts {
             return false;
         }
         let alphas = [0, 8, 16].map(|shift| (opacity.alphas >> shift & 255) as f32);
@@ -86,11 +81,25 @@ impl BrickRay<'_> {
             alpha = barrier(255.0 * alpha);
         } else {
             let [u, v] = [0, 1].map(|k| weighted_sum(weights, opacity.uv.map(|uv| uv[k])));
-            alpha = barrier(alpha * view.lookup(&m, u, v));
+            alpha = barrier(alpha * self.lookup(&m, u, v));
         }
         if m.blends & 1 != 0 {
-            return alpha <= barrier(ALPHA_ONE * drawn(self.draw, &self.ray, id));
+            return alpha <= barrier(ALPHA_ONE * drawn());
         }
         barrier(alpha + 0.5) < barrier(ALPHA_ONE * m.cutoff)
+    }
+}
+
+impl BrickRay<'_> {
+    /// Whether the ray passes through a triangle of the brick that it meets at `h`.
+    #[inline(always)]
+    pub fn passes(&self, triangle: u32, id: u32, h: &TriangleHit) -> bool {
+        !self.brick.opacity.of.is_empty() && self.passes_by_alpha(triangle, id, h)
+    }
+
+    fn passes_by_alpha(&self, triangle: u32, id: u32, h: &TriangleHit) -> bool {
+        let weights = [divide(h.u, h.det), divide(h.v, h.det), divide(h.w, h.det)];
+        let drawn = || drawn(self.draw, &self.ray, id);
+        self.brick.opacity.passes(triangle, weights, self.draw.refracts, drawn)
     }
 }

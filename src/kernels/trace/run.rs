@@ -8,7 +8,7 @@ use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Hit, Ray, Surface, T_INFINITE, TileList};
 use crate::kernels::rays::{RaySet, Slot};
-use crate::kernels::simd::isa::{Best, Isa};
+use crate::kernels::simd::isa::{self, Isa};
 use rayon::prelude::*;
 
 /// Edge of the blocks of rays that one thread traces in a row.
@@ -181,47 +181,28 @@ pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: 
     while rows > BLOCK && rows > of_thread {
         rows /= 2;
     }
-    for_each_block(set, bound, work, [rows, BLOCK_RAYS / rows], |task, band, block| match bound.isa {
-        Best::Scalar(isa) => run_block(isa, bound, kernel, task, band, block),
-        #[cfg(target_arch = "x86_64")]
-        Best::Avx2(isa) => {
-            // SAFETY: a value of the type exists only where AVX2 has been detected.
-            unsafe { run_block_avx2(isa, bound, kernel, task, band, block) }
-        }
-        #[cfg(target_arch = "x86_64")]
-        Best::Avx512(isa) => {
-            // SAFETY: a value of the type exists only where AVX-512 and AVX2 have been detected.
-            unsafe { run_block_avx512(isa, bound, kernel, task, band, block) }
-        }
-        #[cfg(target_arch = "aarch64")]
-        Best::Neon(isa) => run_block(isa, bound, kernel, task, band, block),
+    for_each_block(set, bound, work, [rows, BLOCK_RAYS / rows], |task, band, block| {
+        bound.isa.run(OfBlock { bound, kernel, task, band, block });
     });
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn run_block_avx2(
-    isa: crate::kernels::simd::isa::Avx2,
-    bound: &Bound,
-    kernel: &impl PacketKernel,
-    task: &mut Task,
-    band: &mut Band,
+/// A kernel over a block.
+struct OfBlock<'a, 'b, 'c, K> {
+    bound: &'a Bound<'b>,
+    kernel: &'a K,
+    task: &'a mut Task,
+    band: &'a mut Band<'c>,
     block: Block,
-) {
-    run_block(isa, bound, kernel, task, band, block);
 }
 
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,avx512f,avx512dq")]
-fn run_block_avx512(
-    isa: crate::kernels::simd::isa::Avx512,
-    bound: &Bound,
-    kernel: &impl PacketKernel,
-    task: &mut Task,
-    band: &mut Band,
-    block: Block,
-) {
-    run_block(isa, bound, kernel, task, band, block);
+impl<K: PacketKernel> isa::Work for OfBlock<'_, '_, '_, K> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run<I: Isa>(self, isa: I) {
+        let Self { bound, kernel, task, band, block } = self;
+        run_block(isa, bound, kernel, task, band, block);
+    }
 }
 
 /// Makes packets of a block's rays and runs them.

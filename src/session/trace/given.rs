@@ -38,9 +38,22 @@ pub fn check(ray: &Ray) -> Result<()> {
     Ok(())
 }
 
-/// 2^`log2` in two factors, either of which f64 holds.
+/// 2^`log2`, which is a normal number.
+fn power(log2: i32) -> f64 {
+    f64::from_bits(((log2 + 1023) as u64) << 52)
+}
+
+/// 2^`log2` in two factors, either of which f64 holds; `log2` is that of an f64 or its opposite.
 fn halves(log2: i32) -> [f64; 2] {
-    [f64::from(log2 / 2).exp2(), f64::from(log2 - log2 / 2).exp2()]
+    [power(log2 / 2), power(log2 - log2 / 2)]
+}
+
+/// The exponent of a positive number, also of a subnormal one.
+fn exponent(x: f64) -> i32 {
+    match (x.to_bits() >> 52) as i32 {
+        0 => -1011 - x.to_bits().leading_zeros() as i32,
+        biased => biased - 1023,
+    }
 }
 
 /// A direction scaled by a power of two, exactly.
@@ -56,8 +69,7 @@ impl Scaled {
     /// Of a direction that has a length.
     pub fn of(direction: [f64; 3]) -> Self {
         let largest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
-        // The exponent field, also of a subnormal.
-        let log2 = largest.log2().floor().clamp(-1074.0, 1023.0) as i32;
+        let log2 = exponent(largest);
         let [a, b] = halves(-log2);
         Self { direction: DVec3::from_array(direction) * a * b, log2 }
     }
@@ -84,44 +96,61 @@ pub struct Approach {
     pub start: f64,
 }
 
-/// `ray` from where it comes near the scene; `None` if it never does. A ray that starts in the scene's bounds, or not
-/// farther from them than their diagonal, is as it was.
-pub fn approach(resident: &Resident, ray: &Ray) -> Option<Approach> {
-    let root = resident.top2.first()?;
-    let step = f64::from(resident.objects[0].step_log2).exp2();
-    let [min, max] = [root.min, root.max].map(|corner| DVec3::from_array(corner.map(|x| x as f64)) * step);
-    // A scene that is one point has room about it, too.
-    let reach = (max - min).length().max(step);
-    let scaled = Scaled::of(ray.direction);
-    let is_near = |p: DVec3| p.cmpge(min - reach).all() && p.cmple(max + reach).all();
-    let (mut origin, mut way) = (DVec3::from_array(ray.origin), 0.0);
-    for _ in 0..MOST_MOVES {
-        if is_near(origin) {
-            break;
+/// The room about a scene that rays are brought to.
+#[derive(Clone, Copy, Debug)]
+pub struct Surroundings {
+    /// The scene's bounds.
+    min: DVec3,
+    max: DVec3,
+    /// Their diagonal.
+    reach: f64,
+}
+
+impl Surroundings {
+    /// Of a scene; `None` of an empty one.
+    pub fn new(resident: &Resident) -> Option<Self> {
+        let root = resident.top2.first()?;
+        let step = f64::from(resident.objects[0].step_log2).exp2();
+        let [min, max] = [root.min, root.max].map(|corner| DVec3::from_array(corner.map(|x| x as f64)) * step);
+        // A scene that is one point has room about it, too.
+        Some(Self { min, max, reach: (max - min).length().max(step) })
+    }
+
+    /// `ray` from where it comes near the scene; `None` if it never does. A ray that starts in the scene's bounds, or
+    /// not farther from them than their diagonal, is as it was.
+    pub fn approach(&self, ray: &Ray) -> Option<Approach> {
+        let &Self { min, max, reach } = self;
+        let is_near = |p: DVec3| p.cmpge(min - reach).all() && p.cmple(max + reach).all();
+        if is_near(DVec3::from_array(ray.origin)) {
+            return Some(Approach { ray: *ray, start: 0.0 });
         }
-        let margin = MARGIN * reach + SLAB_ERROR * origin.abs().max_element();
-        let s = entry(origin, scaled.direction, min - margin, max + margin)?;
-        if s == 0.0 {
-            break;
+        let scaled = Scaled::of(ray.direction);
+        let (mut origin, mut way) = (DVec3::from_array(ray.origin), 0.0);
+        for _ in 0..MOST_MOVES {
+            if is_near(origin) {
+                break;
+            }
+            let margin = MARGIN * reach + SLAB_ERROR * origin.abs().max_element();
+            let s = entry(origin, scaled.direction, min - margin, max + margin)?;
+            if s == 0.0 {
+                break;
+            }
+            origin = along(origin, scaled.direction, s);
+            way += s;
         }
-        origin = along(origin, scaled.direction, s);
-        way += s;
+        let start = scaled.given(way);
+        if !origin.is_finite() || !start.is_finite() {
+            return None;
+        }
+        let ray = Ray {
+            origin: origin.to_array(),
+            t_min: ray.t_min - start,
+            // An end at infinity stays there.
+            t_max: ray.t_max - start,
+            direction: ray.direction,
+        };
+        Some(Approach { ray, start })
     }
-    if way == 0.0 {
-        return Some(Approach { ray: *ray, start: 0.0 });
-    }
-    let start = scaled.given(way);
-    if !origin.is_finite() || !start.is_finite() {
-        return None;
-    }
-    let ray = Ray {
-        origin: origin.to_array(),
-        t_min: ray.t_min - start,
-        // An end at infinity stays there.
-        t_max: ray.t_max - start,
-        direction: ray.direction,
-    };
-    Some(Approach { ray, start })
 }
 
 /// Where a ray enters a box, 0 within it; `None` if it does not.
@@ -206,6 +235,21 @@ mod tests {
             naive_differs += u32::from(from + s as f64 * d as f64 != truth as f64);
         }
         assert!(naive_differs > 1000, "{naive_differs}: plain f64 would do");
+    }
+
+    #[test]
+    fn exponents_are_those_of_powers_and_what_lies_between() {
+        for log2 in (-1074..=1023).step_by(7).chain([-1074, -1023, -1022, 0, 1023]) {
+            let least = f64::from(log2).exp2();
+            let most = f64::from_bits((2.0 * least).to_bits() - 1);
+            assert_eq!([exponent(least), exponent(most)], [log2; 2]);
+            let [a, b] = halves(log2);
+            assert_eq!(a * b, least);
+            let scaled = Scaled::of([0.0, -least, 0.5 * least]);
+            assert_eq!(scaled.direction.y, -1.0);
+            // Distances lose digits where they are subnormal.
+            assert!(log2 < -1070 || scaled.given(scaled.scaled(0.75)) == 0.75);
+        }
     }
 
     #[test]

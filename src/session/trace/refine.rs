@@ -4,7 +4,8 @@
 //! ray may pass beside it by a rounding, and at a grazing triangle its plane is then met far away. What is met outside
 //! of the triangle's box, widened by f32 roundings, is not the hit: then the device's distance stands.
 
-use super::{Found, Traced, approach, given::Scaled};
+use super::given::{Scaled, Surroundings};
+use super::{Found, Traced};
 use crate::kernels::frame::Frame;
 use crate::output::npy::{Hit, Ray};
 use crate::stream::Item;
@@ -25,6 +26,7 @@ const ROUNDING: f64 = 1.0 / (1u32 << 19) as f64;
 pub(super) fn refine(traced: &Traced, rays: &[Ray], mut found: Vec<Found>, hits: &mut [Hit]) -> Result<()> {
     let (scene, host) = (traced.scene, traced.executor.workers().host_cache());
     let resident = scene.resident();
+    let Some(surroundings) = Surroundings::new(resident) else { return Ok(()) };
     let brick_of = |found: &Found| resident.leaves[found.leaf as usize].brick;
     found.sort_unstable_by_key(|found| (brick_of(found), found.ray));
     let groups: Vec<&[Found]> = found.chunk_by(|a, b| brick_of(a) == brick_of(b)).collect();
@@ -35,7 +37,7 @@ pub(super) fn refine(traced: &Traced, rays: &[Ray], mut found: Vec<Found>, hits:
         let corners = Corners::new(&resident.bricks[number as usize], &bytes);
         let one = |found: &Found| {
             let points = vertices(resident, found, &corners);
-            let (t, normal) = meet(resident, &rays[found.ray], found.t, points);
+            let (t, normal) = meet(resident, &surroundings, &rays[found.ray], found.t, points);
             (found.ray, t, normal)
         };
         Ok(group.iter().map(one).collect())
@@ -74,11 +76,11 @@ fn vertices(resident: &Resident, found: &Found, corners: &Corners) -> [DVec3; 3]
 
 /// Distance at which `ray` meets the triangle that the device found at `found`, counted from the ray's near origin, and
 /// the triangle's unit normal.
-fn meet(resident: &Resident, ray: &Ray, found: f64, vertices: [DVec3; 3]) -> (f64, DVec3) {
+fn meet(resident: &Resident, surroundings: &Surroundings, ray: &Ray, found: f64, vertices: [DVec3; 3]) -> (f64, DVec3) {
     let [a, b, c] = vertices;
     // Of the order of the source, which storing only turns: about it the normal is right-handed.
     let normal = (b - a).cross(c - a).normalize_or_zero();
-    let Some(near) = approach(resident, ray) else { return (found, normal) };
+    let Some(near) = surroundings.approach(ray) else { return (found, normal) };
     let origin = DVec3::from_array(near.ray.origin);
     let scaled = Scaled::of(ray.direction);
     let [a, b, c] = vertices.map(|vertex| vertex - origin);

@@ -10,7 +10,7 @@ use brickwalk::reference::{Tally, Truth, TruthRay, judge};
 use brickwalk::schedule::Pass;
 use brickwalk::session::Session;
 use brickwalk::session::opened::{Opened, open_scene};
-use brickwalk::session::trace::{EXTENT, approach, device_ray, find, for_rays, trace, trace_device};
+use brickwalk::session::trace::{EXTENT, Surroundings, device_ray, find, for_rays, trace, trace_device};
 use brickwalk::settings::Group;
 use brickwalk_convert::build::{BuildSettings, build};
 use brickwalk_convert::progress::Progress;
@@ -225,6 +225,7 @@ fn instances_are_hit_from_far_away() {
     let (file, mut opened) = opened(&scene, "cpu");
     let resident = file.resident();
     assert!(resident.instances.len() > 8, "they stay instances");
+    let surroundings = Surroundings::new(resident).expect("there is something");
     let truth = Truth::load(&file).expect("truth");
     for distance in [3.0, 1e6, 1e12] {
         let rays = aimed(&truth, distance, 1500);
@@ -233,7 +234,7 @@ fn instances_are_hit_from_far_away() {
         let mut closest = vec![None; rays.len()];
         found.iter().for_each(|found| closest[found.ray] = Some(found));
         for (ray, found) in rays.iter().zip(&closest) {
-            let near = approach(resident, ray).expect("it comes near").ray;
+            let near = surroundings.approach(ray).expect("it comes near").ray;
             let frame = Frame::near(resident, DVec3::from_array(near.origin));
             let device = device_ray(&near, &frame);
             let [o, d] = [device.ray.origin, device.ray.direction];
@@ -252,7 +253,7 @@ fn instances_are_hit_from_far_away() {
             same += 1;
             // Grazing triangles magnify what is rounded.
             fine += usize::from(off(expected.t, hit.t, ray) <= 4.0);
-            let start = approach(resident, ray).expect("it comes near").start;
+            let start = surroundings.approach(ray).expect("it comes near").start;
             coarse += usize::from(off(expected.t, start + found.t, ray) <= 4.0);
         }
         assert!(same > 1300, "from {distance:e}: {same} of 1500 as truth has it");

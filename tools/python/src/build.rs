@@ -11,6 +11,7 @@ use brickwalk_convert::build::{
 use brickwalk_convert::import::{ImportSettings, Input, Up, import};
 use brickwalk_convert::progress;
 use brickwalk_convert::source::{IDENTITY, Mesh, Placement, Primitive, SourceScene};
+use brickwalk_scenes::{Kind, Settings};
 use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -110,11 +111,46 @@ pub fn build_mesh<'py>(
         sources: vec![source],
         ..SourceScene::default()
     };
-    // Its folder is of this scene alone.
-    let settings =
-        BuildSettings { brick_triangles, threads: Some(threads()), proxies: false, ..BuildSettings::default() };
+    // Its folder is of this scene alone. Positions are as near to those given as bricks allow.
+    let settings = BuildSettings {
+        brick_triangles,
+        threads: Some(threads()),
+        lattice: Some(LatticeStep::Finest),
+        proxies: false,
+        ..BuildSettings::default()
+    };
     run_alone(py, &mut Progress::new(progress, 0), move |task| {
         watched(task, |progress| built(build(scene, &settings, &out, progress))).map(|_| ())
+    })
+}
+
+/// Writes the scene file `out` of a generated scene.
+///
+/// # Errors
+/// A kind that there is not, or a count that it cannot have; the file cannot be written.
+#[pyfunction]
+pub fn generate(
+    py: Python<'_>,
+    kind: &str,
+    out: PathBuf,
+    triangles: u64,
+    seed: u64,
+    progress: Option<Bound<'_, PyAny>>,
+) -> PyResult<u64> {
+    let kind: Kind = kind.parse().map_err(|error| wrong(format!("kind {kind:?}: {error}")))?;
+    let possible = kind.triangles();
+    if !possible.contains(&triangles) {
+        let (least, most) = possible.into_inner();
+        return Err(wrong(format!("triangles is {triangles}; a scene of this kind has from {least} to {most}")));
+    }
+    let settings = Settings { kind, triangles, seed, instanced: false, copies: 1 };
+    run_alone(py, &mut Progress::new(progress, 0), move |task| {
+        watched(task, |progress| -> Result<u64> {
+            let scene = brickwalk_scenes::generate(&settings, progress)?;
+            let settings = BuildSettings { threads: Some(threads()), ..BuildSettings::default() };
+            let summary = built(build_source(&scene, &settings, &out, progress))?;
+            Ok(summary.triangles_instanced)
+        })
     })
 }
 

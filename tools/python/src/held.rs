@@ -1,30 +1,24 @@
-//! What the thread of a scene owns: the scene, and once they are needed a device for rays and a session for pictures.
+//! What the thread of a scene owns: the scene, and once they are needed queries and a session for pictures.
 
-use crate::worker::{State, Task};
+use crate::worker::State;
 use anyhow::Result;
 use bricks::SceneFile;
 use brickwalk::counters::Counters;
-use brickwalk::cpu::available_memory;
 use brickwalk::query::{Queries, QueryStats};
-use brickwalk::session::trace::{for_rays, trace};
-use brickwalk::session::{Hit, Opened, Ray};
 use brickwalk::settings::{Adapter, CacheSize};
-use brickwalk::stream::PayloadSource;
 use brickwalk::{Session, Settings};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// Bytes of the cache of queries where nobody tells how much memory is available.
-const LEAST_ROOM: u64 = 1 << 30;
+use std::time::Instant;
 
 /// How a scene is opened.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The scene file.
     pub path: PathBuf,
-    /// Device memory for bricks: of rays, and of pictures as much again.
+    /// Memory for bricks: host memory of queries, and of pictures as much again on their device.
     pub cache: CacheSize,
-    /// The device.
+    /// The device of pictures.
     pub adapter: Adapter,
 }
 
@@ -46,15 +40,15 @@ pub struct Done {
     pub hits: u64,
     /// Pictures.
     pub pictures: u64,
-    /// What tracing these rays counted.
-    pub traced: Counters,
     /// What rendering these pictures counted.
     pub rendered: Counters,
-    /// Queries of geometry.
+    /// Queries.
     pub queries: u64,
-    /// What these took.
+    /// Seconds that they took.
+    pub seconds: f64,
+    /// What they read.
     pub queried: QueryStats,
-    /// The device of rays, once it is open.
+    /// The device of pictures, once it is open.
     pub device: Option<String>,
 }
 
@@ -72,7 +66,6 @@ pub struct Held {
     pub options: Options,
     /// The scene.
     pub scene: Arc<SceneFile>,
-    opened: Option<Opened>,
     /// For pictures.
     pub session: Option<Session>,
     queries: Option<Queries>,
@@ -81,36 +74,9 @@ pub struct Held {
 }
 
 impl Held {
-    /// A scene without a device.
+    /// A scene of which nothing has been asked.
     pub fn new(options: Options, scene: Arc<SceneFile>, done: Shared) -> Self {
-        Self { options, scene, opened: None, session: None, queries: None, done }
-    }
-
-    fn opened(&mut self) -> Result<&mut Opened> {
-        let opened = match self.opened.take() {
-            Some(opened) => opened,
-            None => {
-                let settings = for_rays(&self.options.settings());
-                let opened = Opened::open(self.scene.clone(), &self.options.path, &settings)?;
-                lock(&self.done).device = Some(opened.executor.device().name);
-                opened
-            }
-        };
-        Ok(self.opened.insert(opened))
-    }
-
-    /// The closest hits of rays, or with `any` whether there is one, in their order.
-    ///
-    /// # Errors
-    /// No device; a damaged brick.
-    pub fn trace(&mut self, rays: &[Ray], any: bool, task: &Task) -> Result<Vec<Hit>> {
-        let opened = self.opened()?;
-        let (hits, counters) = trace(&mut opened.traced(), rays, any, &mut |rays| task.advance(rays))?;
-        let mut done = lock(&self.done);
-        *if any { &mut done.occlusion_rays } else { &mut done.rays } += rays.len() as u64;
-        done.hits += hits.iter().filter(|hit| hit.triangle != u32::MAX).count() as u64;
-        done.traced.add(&counters);
-        Ok(hits)
+        Self { options, scene, session: None, queries: None, done }
     }
 
     /// Asks about geometry, with a cache in host memory.
@@ -120,15 +86,14 @@ impl Held {
     pub fn ask<T>(&mut self, ask: impl FnOnce(&Queries) -> Result<T>) -> Result<T> {
         let queries = match self.queries.take() {
             Some(queries) => queries,
-            None => {
-                let room = available_memory().map_or(LEAST_ROOM, |bytes| bytes / 2);
-                Queries::new(self.scene.clone(), self.options.cache.bytes(self.scene.sizes().sum(), room), 0)?
-            }
+            None => Queries::new(self.scene.clone(), self.options.cache, 0)?,
         };
         let queries = self.queries.insert(queries);
+        let clock = Instant::now();
         let answer = ask(queries);
         let mut done = lock(&self.done);
         done.queries += 1;
+        done.seconds += clock.elapsed().as_secs_f64();
         done.queried = queries.stats();
         answer
     }
@@ -136,6 +101,6 @@ impl Held {
 
 impl State for Held {
     fn reset(&mut self) {
-        (self.opened, self.session, self.queries) = (None, None, None);
+        (self.session, self.queries) = (None, None);
     }
 }

@@ -34,5 +34,6 @@ fn _brickwalk(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::Core>()?;
     module.add_function(wrap_pyfunction!(build::build_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(build::convert, module)?)?;
+    module.add_function(wrap_pyfunction!(build::generate, module)?)?;
     module.add_function(wrap_pyfunction!(render::pinhole, module)?)
 }

@@ -1,6 +1,6 @@
-//! Queries of geometry on a scene's thread: all that rays meet, nearest points, what is inside.
+//! Queries on a scene's thread: what rays meet, nearest points, what is inside.
 
-use crate::held::Held;
+use crate::held::{Held, lock};
 use crate::worker::Task;
 use anyhow::{Result, bail};
 use brickwalk::query::{Closest, Intersections};
@@ -15,6 +15,24 @@ fn watch(task: &Task) -> impl FnMut(u64) -> Result<()> + '_ {
         }
         Ok(())
     }
+}
+
+/// What each ray meets first.
+pub fn cast(held: &mut Held, rays: &[Ray], task: &Task) -> Result<Vec<Hit>> {
+    let hits = held.ask(|queries| queries.cast(rays, &mut watch(task)))?;
+    let mut done = lock(&held.done);
+    done.rays += rays.len() as u64;
+    done.hits += hits.iter().filter(|hit| hit.triangle != u32::MAX).count() as u64;
+    Ok(hits)
+}
+
+/// Whether each ray meets anything.
+pub fn any(held: &mut Held, rays: &[Ray], task: &Task) -> Result<Vec<bool>> {
+    let hits = held.ask(|queries| queries.any(rays, &mut watch(task)))?;
+    let mut done = lock(&held.done);
+    done.occlusion_rays += rays.len() as u64;
+    done.hits += hits.iter().filter(|&&hit| hit).count() as u64;
+    Ok(hits)
 }
 
 /// How many triangles each ray meets.

@@ -104,8 +104,9 @@ impl Held {
         let camera = camera.map_or_else(|| own_view(&self.scene, settings), Ok)?;
         session.prepare(&mut Watching(task))?;
         let frame = session.picture(&camera, &mut Watching(task))?.ok_or_else(|| anyhow!("interrupted"))?;
-        let (picture, warnings) = (frame.picture(), session.take_warnings());
+        let (picture, warnings, device) = (frame.picture(), session.take_warnings(), session.device());
         let mut done = lock(&self.done);
+        done.device = Some(device);
         done.pictures += 1;
         frame.records.iter().for_each(|record| done.rendered.add(&**record));
         Ok(Picture { frame, picture, warnings })

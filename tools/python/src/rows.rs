@@ -9,7 +9,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::ops::Range;
 
-/// Rows that are checked before signals are looked for.
+/// Vertices that are checked before signals are looked for.
 const CHECKED: usize = 1 << 18;
 
 /// An array of float32 or float64 with two axes, of any strides.
@@ -48,6 +48,17 @@ impl Named {
 fn numbers<const N: usize, T: Copy + Into<f64>>(view: ArrayView2<T>, rows: Range<usize>) -> Vec<[f64; N]> {
     let columns = view.ncols().min(N);
     let mut all = Vec::with_capacity(rows.len());
+    if let (Some(numbers), true) = (view.as_slice(), columns == view.ncols() && columns > 0) {
+        let rows = numbers[rows.start * columns..rows.end * columns].chunks_exact(columns);
+        all.extend(rows.map(|row| {
+            let mut numbers = [0.0; N];
+            for (&from, to) in row.iter().zip(&mut numbers) {
+                *to = from.into();
+            }
+            numbers
+        }));
+        return all;
+    }
     for row in rows {
         let mut numbers = [0.0; N];
         for (column, number) in numbers[..columns].iter_mut().enumerate() {
@@ -137,47 +148,38 @@ impl<'py> Rows<'py> {
         }
     }
 
-    /// Refuses pairs of points that are none.
-    ///
-    /// # Errors
-    /// Which one.
-    pub fn check_pairs(&self, py: Python<'_>, named: &Named) -> PyResult<()> {
-        self.check(py, |rows| Ok(bad(rows.start, &self.pairs(rows)?, named, |pair| not_finite(pair.as_flattened()))))
-    }
-
-    /// Refuses rays that are none.
-    ///
-    /// # Errors
-    /// Which one, and what is wrong with it.
-    pub fn check_rays(&self, py: Python<'_>, named: &Named) -> PyResult<()> {
-        self.check(py, |rows| {
-            let is_bad = |ray: &Ray| match check(ray) {
-                Err(error) => Some(error.to_string()),
-                Ok(()) if ray.t_min < 0.0 => Some(format!("t_min is {}; it must be 0 or greater", ray.t_min)),
-                Ok(()) => None,
-            };
-            Ok(bad(rows.start, &self.rays(rows)?, named, is_bad))
-        })
-    }
-
     /// Refuses points that are none.
     ///
     /// # Errors
     /// Which one.
     pub fn check_points(&self, py: Python<'_>, named: &Named) -> PyResult<()> {
-        self.check(py, |rows| Ok(bad(rows.start, &self.points(rows)?, named, |point| not_finite(point))))
-    }
-
-    fn check(&self, py: Python<'_>, what: impl Fn(Range<usize>) -> PyResult<Option<String>>) -> PyResult<()> {
         let count = self.shape().0;
         for start in (0..count).step_by(CHECKED) {
             py.check_signals()?;
-            if let Some(text) = what(start..count.min(start + CHECKED))? {
-                return Err(wrong(text));
-            }
+            bad_point(start, &self.points(start..count.min(start + CHECKED))?, named)
+                .map_or(Ok(()), |text| Err(wrong(text)))?;
         }
         Ok(())
     }
+}
+
+/// The first of pairs of points, which begin at row `start`, that is none, and why.
+pub fn bad_pair(start: usize, pairs: &[[[f64; 3]; 2]], named: &Named) -> Option<String> {
+    bad(start, pairs, named, |pair| not_finite(pair.as_flattened()))
+}
+
+/// The first of rays that is none, and why.
+pub fn bad_ray(start: usize, rays: &[Ray], named: &Named) -> Option<String> {
+    bad(start, rays, named, |ray| match check(ray) {
+        Err(error) => Some(error.to_string()),
+        Ok(()) if ray.t_min < 0.0 => Some(format!("t_min is {}; it must be 0 or greater", ray.t_min)),
+        Ok(()) => None,
+    })
+}
+
+/// The first of points that is none, and why.
+pub fn bad_point(start: usize, points: &[[f64; 3]], named: &Named) -> Option<String> {
+    bad(start, points, named, |point| not_finite(point))
 }
 
 fn not_finite(numbers: &[f64]) -> Option<String> {

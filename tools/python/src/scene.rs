@@ -4,7 +4,7 @@ use crate::errors::{exception, failed, wrong};
 use crate::held::{self, Done, Held, Options, Shared};
 use crate::query;
 use crate::render;
-use crate::rows::{Named, Rows};
+use crate::rows::{Named, Rows, bad_pair, bad_point, bad_ray};
 use crate::worker::{Desk, Progress, Task, Worker, run_alone};
 use anyhow::Result;
 use bricks::SceneFile;
@@ -18,15 +18,10 @@ use pyo3::types::{PyDict, PyTuple};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
 
-/// Rows of a job, at least and at most: from a dispatch of rays on.
-type Batches = (usize, usize);
-const DISPATCHES: Batches = (1 << 16, 1 << 20);
-/// Of queries, which bring what they are given into the order of bricks: the more at once, the less is read twice.
-const WHOLE: Batches = (1 << 22, 1 << 22);
-/// Jobs that take less become larger, and those that take four times as long smaller.
-const SHORT: Duration = Duration::from_millis(250);
+/// Most rows of a job. Queries bring what they are given into the order of bricks: the more at once, the less is read
+/// twice.
+const MOST: usize = 1 << 22;
 
 /// A scene that is open. Threads may share it: their jobs are done in turn.
 #[pyclass(frozen, module = "brickwalk._brickwalk")]
@@ -38,8 +33,8 @@ pub struct Core {
     worker: Mutex<Option<Worker<Held>>>,
 }
 
-/// Refuses rows that are not what they should be.
-type Check<'py> = fn(&Rows<'py>, Python<'py>, &Named) -> PyResult<()>;
+/// Says of items that begin at a row which is the first that is none, and why.
+type Bad<R> = fn(usize, &[R], &Named) -> Option<String>;
 /// Reads some of the rows.
 type Read<'py, R> = fn(&Rows<'py>, Range<usize>) -> PyResult<Vec<R>>;
 
@@ -48,10 +43,9 @@ struct Job<'py, 'a, R> {
     rows: Rows<'py>,
     named: Named,
     progress: Told<'py>,
-    check: Check<'py>,
+    bad: Bad<R>,
     read: Read<'py, R>,
     core: &'a Core,
-    batches: Batches,
 }
 
 impl<'py, R: Send + 'static> Job<'py, '_, R> {
@@ -63,24 +57,22 @@ impl<'py, R: Send + 'static> Job<'py, '_, R> {
         mut take: impl FnMut(usize, T) -> PyResult<()>,
     ) -> PyResult<()> {
         let desk = self.core.desk()?;
-        (self.check)(&self.rows, py, &self.named)?;
         let (count, _) = self.rows.shape();
+        let parts = || (0..count).step_by(MOST).map(|start| start..count.min(start + MOST));
+        let read = |part: Range<usize>| {
+            py.check_signals()?;
+            let given = (self.read)(&self.rows, part.clone())?;
+            (self.bad)(part.start, &given, &self.named).map_or(Ok(given), |text| Err(wrong(text)))
+        };
+        // Nothing is done before all is known to be good.
+        if count > MOST {
+            parts().try_for_each(|part| read(part).map(|_| ()))?;
+        }
         let mut progress = Progress::new(self.progress, count as u64);
-        let (least, largest) = self.batches;
-        let (mut start, mut most) = (0, least);
-        while start < count {
-            let end = count.min(start + most);
-            let given = (self.read)(&self.rows, start..end)?;
-            let clock = Instant::now();
+        for part in parts() {
+            let (start, end, given) = (part.start, part.end, read(part)?);
             take(start, desk.run(py, &mut progress, move |held, task| work(held, &given, task))?)?;
-            let time = clock.elapsed();
-            if time < SHORT {
-                most = (2 * most).min(largest);
-            } else if time > 4 * SHORT {
-                most = (most / 2).max(least);
-            }
             progress.reached(end as u64)?;
-            start = end;
         }
         Ok(())
     }
@@ -110,8 +102,8 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<Job<'py, '_, Ray>> {
         let (rows, named) = (Rows::of(rows)?, Named { name: "ray", shape });
-        let (check, read): (Check<'py>, Read<'py, Ray>) = (Rows::check_rays, Rows::rays);
-        Ok(Job { rows, named, progress, check, read, core: self, batches: DISPATCHES })
+        let (bad, read): (Bad<Ray>, Read<'py, Ray>) = (bad_ray, Rows::rays);
+        Ok(Job { rows, named, progress, bad, read, core: self })
     }
 
     fn points<'py>(
@@ -121,8 +113,8 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<Job<'py, '_, [f64; 3]>> {
         let (rows, named) = (Rows::of(rows)?, Named { name: "point", shape });
-        let (check, read): (Check<'py>, Read<'py, [f64; 3]>) = (Rows::check_points, Rows::points);
-        Ok(Job { rows, named, progress, check, read, core: self, batches: WHOLE })
+        let (bad, read): (Bad<[f64; 3]>, Read<'py, [f64; 3]>) = (bad_point, Rows::points);
+        Ok(Job { rows, named, progress, bad, read, core: self })
     }
 }
 
@@ -217,19 +209,18 @@ impl Core {
     /// What was done since the scene was opened.
     fn stats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let done = &*held::lock(&self.done);
-        let Done { traced, rendered, .. } = done;
-        let both = |of: fn(&Counters) -> u64| of(traced) + of(rendered);
-        let bytes = |c: &Counters| c.bytes_bvh + c.bytes_geometry + c.bytes_attributes + c.bytes_textures;
+        let Done { rendered, .. } = done;
+        let Counters { bytes_bvh, bytes_geometry, bytes_attributes, bytes_textures, .. } = rendered;
         let dict = PyDict::new(py);
         dict.set_item("rays", done.rays)?;
         dict.set_item("occlusion_rays", done.occlusion_rays)?;
         dict.set_item("hits", done.hits)?;
         dict.set_item("pictures", done.pictures)?;
-        dict.set_item("bricks_loaded", both(|c| c.bricks_loaded))?;
-        dict.set_item("bricks_evicted", both(|c| c.bricks_evicted))?;
-        dict.set_item("bytes_loaded", both(bytes))?;
-        dict.set_item("round_trips", both(|c| c.round_trips))?;
-        dict.set_item("seconds", (traced.ms + rendered.ms) * 1e-3)?;
+        dict.set_item("bricks_loaded", rendered.bricks_loaded)?;
+        dict.set_item("bricks_evicted", rendered.bricks_evicted)?;
+        dict.set_item("bytes_loaded", bytes_bvh + bytes_geometry + bytes_attributes + bytes_textures)?;
+        dict.set_item("round_trips", rendered.round_trips)?;
+        dict.set_item("seconds", done.seconds + rendered.ms * 1e-3)?;
         dict.set_item("queries", done.queries)?;
         dict.set_item("query_payloads_read", done.queried.payloads_read)?;
         dict.set_item("query_bytes_read", done.queried.bytes_read)?;
@@ -251,8 +242,7 @@ impl Core {
         normal: &Bound<'py, PyArray2<f32>>,
         progress: Told<'py>,
     ) -> PyResult<()> {
-        let cast = |held: &mut Held, rays: &[Ray], task: &Task| held.trace(rays, false, task);
-        self.rays(rays, shape, progress)?.run(py, cast, |start, hits: Vec<Hit>| {
+        self.rays(rays, shape, progress)?.run(py, query::cast, |start, hits: Vec<Hit>| {
             if hits.iter().any(|hit| hit.t.is_nan()) {
                 return Err(failed("a hit is not a number; this is a defect of brickwalk"));
             }
@@ -272,9 +262,8 @@ impl Core {
         hit: &Bound<'py, PyArray1<bool>>,
         progress: Told<'py>,
     ) -> PyResult<()> {
-        let any = |held: &mut Held, rays: &[Ray], task: &Task| held.trace(rays, true, task);
-        let take = |start, hits: Vec<Hit>| write(hit, start, hits.iter().map(|hit| hit.triangle != u32::MAX));
-        self.rays(rays, shape, progress)?.run(py, any, take)
+        let take = |start, hits: Vec<bool>| write(hit, start, hits.into_iter());
+        self.rays(rays, shape, progress)?.run(py, query::any, take)
     }
 
     /// Fills an array with how many triangles rays meet.
@@ -287,7 +276,7 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<()> {
         let take = |start, counts: Vec<u32>| write(count, start, counts.into_iter());
-        Job { batches: WHOLE, ..self.rays(rays, shape, progress)? }.run(py, query::count, take)
+        self.rays(rays, shape, progress)?.run(py, query::count, take)
     }
 
     /// All that rays meet: where the hits of each begin, distances, triangles, weights, normals.
@@ -303,7 +292,7 @@ impl Core {
             listed.extend(&found);
             Ok(())
         };
-        Job { batches: WHOLE, ..self.rays(rays, shape, progress)? }.run(py, query::list, take)?;
+        self.rays(rays, shape, progress)?.run(py, query::list, take)?;
         let hits = listed.t.len();
         PyTuple::new(
             py,
@@ -381,8 +370,8 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<()> {
         let (rows, named) = (Rows::of(pairs)?, Named { name: "pair", shape });
-        let (check, read): (Check<'py>, Read<'py, _>) = (Rows::check_pairs, Rows::pairs);
-        let job = Job { rows, named, progress, check, read, core: self, batches: WHOLE };
+        let (bad, read): (Bad<_>, Read<'py, _>) = (bad_pair, Rows::pairs);
+        let job = Job { rows, named, progress, bad, read, core: self };
         let take = |start, found: Vec<bool>| write(free, start, found.into_iter());
         job.run(py, query::visibility, take)
     }

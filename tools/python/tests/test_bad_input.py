@@ -96,13 +96,17 @@ def test_an_adapter_that_there_is_not():
         assert scene.info["triangles"] == 12
         for _ in range(2):
             with pytest.raises(brickwalk.BrickwalkError, match="no such device"):
-                scene.cast_rays([[0, 0, 9, 0, 0, -1.0]])
+                scene.render(size=(16, 16))
+        # Which rays do not need.
+        assert scene.test_occlusions([[0.5, 0.25, 9, 0, 0, -1.0]])
 
 
 def test_a_cache_too_small_for_a_brick():
     with brickwalk.Scene.from_arrays(*meshes.soup(2000), cache=16, adapter="cpu") as scene:
         with pytest.raises(brickwalk.BrickwalkError, match="too small"):
-            scene.cast_rays([[0, 0, 9, 0, 0, -1.0]])
+            scene.render(size=(16, 16))
+        # Queries take what they need of it.
+        assert not scene.test_occlusions([[900.0, 0, 9, 0, 0, -1.0]])
 
 
 def test_files(tmp_path, box):

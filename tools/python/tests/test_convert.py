@@ -79,3 +79,37 @@ def test_paths_that_do_not_do(model, tmp_path):
     with pytest.raises(brickwalk.BrickwalkError, match="bad.glb"):
         brickwalk.convert(tmp_path / "bad.glb", out)
     assert not out.exists()
+
+
+def test_generated_scenes(tmp_path):
+    done = []
+    count = brickwalk.generate("cornell", tmp_path / "a.bricks", triangles=20_000, progress=lambda d, t: done.append(d))
+    with brickwalk.Scene.open(tmp_path / "a.bricks", adapter="cpu") as scene:
+        assert scene.info["triangles"] == count and 10_000 < count < 40_000
+    brickwalk.generate("cornell", tmp_path / "b.bricks", triangles=20_000)
+    assert (tmp_path / "a.bricks").read_bytes() == (tmp_path / "b.bricks").read_bytes()
+    with pytest.raises(ValueError, match='kind "village"'):
+        brickwalk.generate("village", tmp_path / "c.bricks")
+    with pytest.raises(ValueError, match="triangles"):
+        brickwalk.generate("city", tmp_path / "c.bricks", triangles=100)
+    with pytest.raises(ValueError, match=".bricks"):
+        brickwalk.generate("city", tmp_path / "c.glb")
+    assert not (tmp_path / "c.bricks").exists()
+
+
+def test_the_window_is_a_program(box, tmp_path, monkeypatch):
+    program = tmp_path / "brickwalk"
+    program.write_text('#!/bin/sh\nprintf "%s\\n" "$@" >"$(dirname "$0")/words"\n')
+    program.chmod(0o755)
+    monkeypatch.setenv("BRICKWALK", str(program))
+    assert box.view("--size", "640x360").wait(10) == 0
+    assert (tmp_path / "words").read_text().split() == ["view", box.info["path"], "--size", "640x360"]
+    with pytest.raises(TypeError):
+        box.view(7)
+    monkeypatch.setenv("BRICKWALK", str(tmp_path / "none"))
+    with pytest.raises(FileNotFoundError, match="BRICKWALK names no program"):
+        box.view()
+    monkeypatch.delenv("BRICKWALK")
+    monkeypatch.setenv("PATH", str(tmp_path / "empty"))
+    with pytest.raises(FileNotFoundError, match="not on the path"):
+        box.view()

@@ -189,3 +189,30 @@ def test_an_empty_scene():
         assert scene.distance(point).tolist() == [np.inf] and scene.occupancy(point).tolist() == [False]
         assert scene.count_intersections([0, 0, 0, 0, 0, 1.0]) == 0
         assert scene.visibility([0, 0, 0.0], [1, 1, 1.0]).item() is True
+
+
+def test_results_go_where_they_are_wanted(shell):
+    scene, *_ = shell
+    rays, points = meshes.random_rays(50, seed=31).reshape(5, 10, 6), meshes.random_rays(50, seed=32)[:, :3]
+    for call, given, dtype in [
+        (scene.count_intersections, (rays,), np.uint32),
+        (scene.distance, (points,), np.float64),
+        (scene.signed_distance, (points,), np.float64),
+        (scene.occupancy, (points,), np.bool_),
+        (scene.visibility, (points, points[::-1]), np.bool_),
+    ]:
+        expected = call(*given)
+        # Of one piece, and with strides.
+        for out in (np.zeros(expected.shape, dtype), np.zeros((*expected.shape, 2), dtype)[..., 0]):
+            assert call(*given, out=out) is out
+            np.testing.assert_array_equal(out, expected)
+        with pytest.raises(TypeError, match="out"):
+            call(*given, out=np.zeros(expected.shape, np.complex64))
+        with pytest.raises(ValueError, match="shape"):
+            call(*given, out=np.zeros((3, *expected.shape), dtype))
+    whole = scene.closest_points(points)
+    some = {"distance": np.zeros(50), "normal": np.zeros((50, 3), np.float32)}
+    found = scene.closest_points(points, out=some)
+    assert found["distance"] is some["distance"]
+    for name in whole:
+        np.testing.assert_array_equal(found[name], whole[name])

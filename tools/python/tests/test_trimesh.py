@@ -49,8 +49,16 @@ def test_nothing_is_hit(ray):
 def test_contained_points(ray):
     assert ray.contains_points([[0.5, 0.5, 0.5], [0.5, 0.5, 1.5]]).tolist() == [True, False]
     open_box = RayMeshIntersector(meshes.box()[0], meshes.box()[1][:-1], adapter="cpu")
-    with pytest.raises(brickwalk.BrickwalkError, match="closed"):
-        open_box.contains_points([[0.5, 0.5, 0.5]])
+    # A hole is no error, as it is none there.
+    assert open_box.contains_points([[0.5, 0.5, 1.5]]).tolist() == [False]
+
+
+def test_a_point_where_triangles_touch_counts_once(ray):
+    origins, directions = [[0.5, 0.5, 3.0], [0.0, 0.0, 3.0]], [[0.0, 0.0, -1.0]] * 2
+    triangle, which = ray.intersects_id(origins, directions)
+    assert np.bincount(which).tolist() == [2, 2]
+    assert len(triangle) < len(ray.scene.list_intersections(np.hstack([origins, directions]))["t"]), "the control"
+    assert len(ray.intersects_id(origins, directions, max_hits=1)[0]) == 2
 
 
 def test_arrays_that_do_not_go_together(ray):

@@ -194,6 +194,15 @@ pub use neon::Neon;
 #[cfg(target_arch = "x86_64")]
 pub use x86::{Avx2, Avx512};
 
+/// Work that is compiled for every instruction set. Implementations are always inlined, so that all of it is.
+pub trait Work {
+    /// What comes of it.
+    type Out;
+
+    /// Does it.
+    fn run<I: Isa>(self, isa: I) -> Self::Out;
+}
+
 /// The instruction set that kernels run with.
 #[derive(Clone, Copy, Debug)]
 pub enum Best {
@@ -239,6 +248,26 @@ impl Best {
         all.extend(Neon::detect().map(Self::Neon));
         println!("{all:?}");
         all
+    }
+
+    /// Does `work` with it.
+    #[inline]
+    pub fn run<W: Work>(self, work: W) -> W::Out {
+        match self {
+            Self::Scalar(isa) => work.run(isa),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(isa) => {
+                // SAFETY: a value of the type exists only where AVX2 has been detected.
+                unsafe { x86::run_avx2(isa, work) }
+            }
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(isa) => {
+                // SAFETY: a value of the type exists only where AVX-512 and AVX2 have been detected.
+                unsafe { x86::run_avx512(isa, work) }
+            }
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(isa) => work.run(isa),
+        }
     }
 
     /// [`Isa::hits`], by a call: the caller need not be compiled for the instruction set.

@@ -1,6 +1,6 @@
 //! AVX2 and AVX-512. Single rays meet eight children with AVX2 in both.
 
-use super::{Isa, Lanes};
+use super::{Isa, Lanes, Work};
 use crate::kernels::simd::wide::x86::{Eight, Sixteen};
 use crate::kernels::trace::node::{FramedRay, NodeHits, UNIT};
 use bricks::Node;
@@ -180,4 +180,16 @@ fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
     let priority = _mm256_sub_epi32(_mm256_set1_epi32(31), slot);
     let first = _mm256_and_si256(what, _mm256_set1_epi32(31));
     any(_mm256_sllv_epi32(count, _mm256_blendv_epi8(first, priority, inner)))
+}
+
+/// Does `work`, compiled for AVX2.
+#[target_feature(enable = "avx2")]
+pub(super) fn run_avx2<W: Work>(isa: Avx2, work: W) -> W::Out {
+    work.run(isa)
+}
+
+/// Does `work`, compiled for AVX-512.
+#[target_feature(enable = "avx2,avx512f,avx512dq")]
+pub(super) fn run_avx512<W: Work>(isa: Avx512, work: W) -> W::Out {
+    work.run(isa)
 }

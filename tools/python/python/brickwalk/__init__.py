@@ -18,7 +18,7 @@ import numpy as _numpy  # noqa: F401
 from . import trimesh
 from ._brickwalk import BrickwalkError, __version__
 from ._camera import Camera, pinhole
-from ._convert import convert
+from ._convert import convert, generate
 from ._picture import Picture
 from ._scene import INVALID_ID, Scene
 from .raycasting import RaycastingScene
@@ -32,6 +32,7 @@ __all__ = [
     "Scene",
     "__version__",
     "convert",
+    "generate",
     "pinhole",
     "trimesh",
 ]

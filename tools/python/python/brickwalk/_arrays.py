@@ -116,6 +116,23 @@ class Results:
         return self._arrays
 
 
+#: Of a distance, and of the distance of a ray's origin from that of the scene: hits that are no farther apart are of
+#: one point.
+_SAME = 1e-11
+
+
+def once(rays: np.ndarray, ray: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Which hits to keep so that a point where triangles touch counts once: bool (h,). ``ray`` (h,) names those of
+    ``rays`` (n, 6), and with ``t`` (h,) is in their order and that of distance. At an edge that two triangles share a
+    ray meets both.
+    """
+    kept = np.ones(len(t), np.bool_)
+    reach = np.abs(rays[:, :3]).max(axis=1, initial=0) / np.abs(rays[:, 3:6]).max(axis=1, initial=0)
+    near = _SAME * (np.abs(t) + reach[ray])
+    kept[1:] = (ray[1:] != ray[:-1]) | (t[1:] - t[:-1] > near[1:])
+    return kept
+
+
 def _is_whole(array: np.ndarray) -> bool:
     return bool(array.flags.c_contiguous and array.flags.aligned)
 

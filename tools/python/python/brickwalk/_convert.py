@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from . import _brickwalk
-from ._arrays import check_progress
+from ._arrays import check_progress, whole
 
 Path = str | os.PathLike[str]
 
@@ -83,3 +83,31 @@ def convert(
     if "movable" in settings:
         settings["movable"] = [movable] if isinstance(movable, str) else list(movable or ())
     return _brickwalk.convert(names, target, settings, progress)
+
+
+def generate(
+    kind: str,
+    out: Path,
+    *,
+    triangles: int = 1_000_000,
+    seed: int = 0,
+    progress: Callable[[int, int], Any] | None = None,
+) -> int:
+    """Writes a generated scene, which appears whole or not at all. Equal arguments make equal scenes.
+
+    ``kind`` is "city", "pipes" (a plant), "terrain" (woods), "stadium" or "cornell"; ``out`` ends in ``.bricks``.
+    ``triangles`` is about how many there are with instances, at least 10,000 to 500,000 by kind, up to 150,000,000;
+    ``seed`` 0 or greater.
+
+    Returns the number of triangles with instances.
+
+    Raises ValueError for a kind or a number that there is not, or for the name of ``out``.
+    """
+    check_progress(progress)
+    target = os.fsdecode(os.fspath(out))
+    if os.path.splitext(target)[1].lower() != ".bricks":
+        raise ValueError(f"{target}: what is written is a scene file; end its name in .bricks")
+    count, start = whole("triangles", triangles, 1, 150_000_000), whole("seed", seed, 0, (1 << 64) - 1)
+    if not isinstance(kind, str):
+        raise TypeError(f"kind must be text, not {type(kind).__name__}")
+    return _brickwalk.generate(kind, target, count, start, progress)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
+import subprocess
 import tempfile
 import warnings
 import weakref
@@ -58,10 +60,11 @@ class Scene:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str], cache: str | int = "2G", adapter: str = "auto") -> Scene:
-        """Opens a scene file. Only its resident part is read; a device is opened by the first ray.
+        """Opens a scene file. Only its resident part is read; a device is opened by the first picture.
 
-        ``cache`` is the device memory for bricks: a size as "2G", a share as "25%", bytes, or "auto". Pictures take as
-        much again. ``adapter`` is "auto", "cpu", or a part of the name of a graphics adapter.
+        ``cache`` is the memory for bricks: a size as "2G", a share as "25%", bytes, or "auto". Queries take it in host
+        memory, pictures as much again on their device. ``adapter``, which renders pictures, is "auto", "cpu", or a part
+        of the name of a graphics adapter.
 
         Raises FileNotFoundError, ValueError for a cache that is none or a model that is not converted, BrickwalkError
         for a file that is damaged.
@@ -87,9 +90,10 @@ class Scene:
         """A scene of one mesh.
 
         ``vertices`` float32 or float64 (n, 3), finite; ``faces`` integers (m, 3), each less than n. The triangle of a
-        hit is the row of ``faces``. Triangles without area are left out, their numbers are not. ``brick_triangles`` is
-        the most triangles of a brick, 1 to 1048576. The scene lies in a temporary file, which is removed when it is
-        closed: keep it open while processes that it was sent to use it.
+        hit is the row of ``faces``. Positions are rounded to a lattice of 2^-24 of the size of a brick or finer.
+        Triangles without area are left out, their numbers are not. ``brick_triangles`` is the most triangles of a
+        brick, 1 to 1048576. The scene lies in a temporary file, which is removed when it is closed: keep it open while
+        processes that it was sent to use it.
 
         Raises ValueError that names the row of a vertex or face at fault, TypeError for another dtype.
         """
@@ -155,11 +159,11 @@ class Scene:
     def stats(self) -> dict[str, Any]:
         """What was done since the scene was opened.
 
-        ``rays`` whose closest hit was looked for, ``occlusion_rays``, ``hits`` of both, ``pictures``;
-        ``bricks_loaded``, ``bricks_evicted`` and ``bytes_loaded`` of the cache, ``round_trips`` to the device,
-        ``seconds`` spent on it, ``device``, its name once it is open, else None. ``queries`` of geometry,
-        ``query_payloads_read`` and ``query_bytes_read`` from the file for them, ``query_most_bytes`` of those in memory
-        at a time.
+        ``queries``, calls of at most 4,194,304 rays or points each; ``rays`` whose closest hit was looked for,
+        ``occlusion_rays``, ``hits`` of both; ``query_payloads_read`` and ``query_bytes_read`` from the file,
+        ``query_most_bytes`` of those in memory at a time. ``pictures``; ``bricks_loaded``, ``bricks_evicted``,
+        ``bytes_loaded`` and ``round_trips`` of their device, ``device``, its name once it is open, else None.
+        ``seconds`` spent on all of it.
         """
         return self._check().stats()
 
@@ -203,19 +207,22 @@ class Scene:
 
         Raises as :meth:`cast_rays`.
         """
-        given = None if out is None else {"hit": out}
-        return self.cast_rays(rays, any=True, out=given, progress=progress)["hit"]
+        return self.cast_rays(rays, any=True, out=_one("hit", out), progress=progress)["hit"]
 
-    def count_intersections(self, rays: Any, *, progress: Progress | None = None) -> np.ndarray:
-        """How many triangles each of rays (..., 6) or (..., 8) meets: uint32 (...).
+    def count_intersections(
+        self, rays: Any, *, out: np.ndarray | None = None, progress: Progress | None = None
+    ) -> np.ndarray:
+        """How many triangles each of rays (..., 6) or (..., 8) meets: uint32 (...), or ``out``, which is of that dtype
+        and shape.
 
         Opacity does not matter. Raises as :meth:`cast_rays`.
         """
         rows, lead = floats(rays, "rays", (6, 8))
         check_progress(progress)
-        count = np.empty(len(rows), np.uint32)
-        self._check().count(rows, lead, count, progress)
-        return count.reshape(lead)
+        core = self._check()
+        results = Results(_one("count", out), lead, {"count": (np.uint32, ())})
+        core.count(rows, lead, results.flat["count"], progress)
+        return results.finish()["count"]
 
     def list_intersections(self, rays: Any, *, progress: Progress | None = None) -> dict[str, np.ndarray]:
         """All that rays (..., 6) or (..., 8) meet, h hits of n rays: ray by ray in the order of the array, and along a
@@ -233,43 +240,70 @@ class Scene:
         ids = np.repeat(np.arange(len(rows), dtype=np.int64), np.diff(splits))
         return {"ray_splits": splits, "ray_ids": ids, "t": t, "triangle": triangle, "uv": uv, "normal": normal}
 
-    def closest_points(self, points: Any, *, progress: Progress | None = None) -> dict[str, np.ndarray]:
+    def closest_points(
+        self,
+        points: Any,
+        *,
+        out: Mapping[str, np.ndarray] | None = None,
+        progress: Progress | None = None,
+    ) -> dict[str, np.ndarray]:
         """The nearest points of the scene to points (..., 3), in its units.
 
         Returns ``points`` float64 (..., 3); ``distance`` float64 (...); ``triangle`` uint32 (...); ``uv`` float32
         (..., 2), weights of its vertices 1 and 2; ``normal`` float32 (..., 3), its unit normal. In a scene without
-        triangles points are NaN, distances +inf and triangles 4294967295.
+        triangles points are NaN, distances +inf and triangles 4294967295. ``out`` as of :meth:`cast_rays`.
 
         Raises ValueError that names a point that is not finite, TypeError for another dtype.
         """
         rows, lead = floats(points, "points", (3,))
         check_progress(progress)
         kinds = {"points": (np.float64, (3,)), "distance": (np.float64, ()), **_HIT}
-        results = Results(None, lead, kinds)
-        flat = results.flat
         core = self._check()
+        results = Results(out, lead, kinds)
+        flat = results.flat
         core.closest(
             rows, lead, flat["points"], flat["distance"], flat["triangle"], flat["uv"], flat["normal"], progress
         )
         return results.finish()
 
-    def distance(self, points: Any, *, progress: Progress | None = None) -> np.ndarray:
-        """The distances of points (..., 3) from the scene, in its units: float64 (...). As :meth:`closest_points`."""
-        return self.closest_points(points, progress=progress)["distance"]
+    def distance(
+        self, points: Any, *, out: np.ndarray | None = None, progress: Progress | None = None
+    ) -> np.ndarray:
+        """The distances of points (..., 3) from the scene, in its units: float64 (...), or ``out``, which is of that
+        dtype and shape. Raises as :meth:`closest_points`.
+        """
+        return self.closest_points(points, out=_one("distance", out), progress=progress)["distance"]
 
-    def signed_distance(self, points: Any, *, allow_open: bool = False, progress: Progress | None = None) -> np.ndarray:
-        """The distances of points (..., 3) from the scene, in its units, negative inside: float64 (...).
+    def signed_distance(
+        self,
+        points: Any,
+        *,
+        allow_open: bool = False,
+        out: np.ndarray | None = None,
+        progress: Progress | None = None,
+    ) -> np.ndarray:
+        """The distances of points (..., 3) from the scene, in its units, negative inside: float64 (...), or ``out``,
+        which is of that dtype and shape.
 
         Raises as :meth:`occupancy`.
         """
         rows, lead = floats(points, "points", (3,))
         check_progress(progress)
-        distance = np.empty(len(rows), np.float64)
-        self._check().signed_distance(rows, lead, distance, bool(allow_open), progress)
-        return distance.reshape(lead)
+        core = self._check()
+        results = Results(_one("distance", out), lead, {"distance": (np.float64, ())})
+        core.signed_distance(rows, lead, results.flat["distance"], bool(allow_open), progress)
+        return results.finish()["distance"]
 
-    def occupancy(self, points: Any, *, allow_open: bool = False, progress: Progress | None = None) -> np.ndarray:
-        """Whether points (..., 3) are inside the closed surfaces of the scene: bool (...).
+    def occupancy(
+        self,
+        points: Any,
+        *,
+        allow_open: bool = False,
+        out: np.ndarray | None = None,
+        progress: Progress | None = None,
+    ) -> np.ndarray:
+        """Whether points (..., 3) are inside the closed surfaces of the scene: bool (...), or ``out``, which is of that
+        dtype and shape.
 
         Of points on a surface it is not said. With ``allow_open`` surfaces may have holes; points near those may be
         taken for inside or outside.
@@ -278,14 +312,17 @@ class Scene:
         """
         rows, lead = floats(points, "points", (3,))
         check_progress(progress)
-        inside = np.empty(len(rows), np.bool_)
-        self._check().occupancy(rows, lead, inside, bool(allow_open), progress)
-        return inside.reshape(lead)
+        core = self._check()
+        results = Results(_one("inside", out), lead, {"inside": (np.bool_, ())})
+        core.occupancy(rows, lead, results.flat["inside"], bool(allow_open), progress)
+        return results.finish()["inside"]
 
-    def visibility(self, a: Any, b: Any, *, progress: Progress | None = None) -> np.ndarray:
+    def visibility(
+        self, a: Any, b: Any, *, out: np.ndarray | None = None, progress: Progress | None = None
+    ) -> np.ndarray:
         """Whether the ways from points ``a`` (..., 3) to points ``b`` (..., 3) are free: bool of the shape that the two
-        broadcast to, without their last axis. A hair at either end is left out, so that points on surfaces see what is
-        before them.
+        broadcast to, without their last axis, or ``out``, which is of that dtype and shape. A hair at either end is
+        left out, so that points on surfaces see what is before them.
 
         Raises ValueError that names a pair that is not finite, or shapes that do not go together.
         """
@@ -298,9 +335,27 @@ class Scene:
         pairs = np.empty((*shape[:-1], 6), np.float64)
         for k, (rows, lead) in enumerate(ends):
             pairs[..., 3 * k : 3 * k + 3] = rows.reshape(*lead, 3)
-        free = np.empty(pairs.size // 6, np.bool_)
-        self._check().visibility(pairs.reshape(-1, 6), shape[:-1], free, progress)
-        return free.reshape(shape[:-1])
+        core = self._check()
+        results = Results(_one("free", out), shape[:-1], {"free": (np.bool_, ())})
+        core.visibility(pairs.reshape(-1, 6), shape[:-1], results.flat["free"], progress)
+        return results.finish()["free"]
+
+    def view(self, *options: str) -> subprocess.Popen[bytes]:
+        """Opens a window to fly through the scene, and returns its process while the person looks.
+
+        The window is the program ``brickwalk``, which is installed beside this package; the environment variable
+        ``BRICKWALK`` names it where it is not on the path. ``options`` are those of ``brickwalk view``, as
+        ``"--size", "1280x720"``. A scene that was made of arrays is to stay open until the window is closed.
+
+        Raises FileNotFoundError where the program is not found.
+        """
+        self._check()
+        program = os.environ.get("BRICKWALK") or shutil.which("brickwalk")
+        if not program or not shutil.which(program):
+            where = "BRICKWALK names no program" if program else "the program brickwalk is not on the path"
+            raise FileNotFoundError(errno.ENOENT, f"{where}: install it from its sources with cargo install --path .")
+        words = [_text("an option", option) for option in options]
+        return subprocess.Popen([program, "view", self._options[0], *words])
 
     pinhole = staticmethod(pinhole)
 
@@ -333,6 +388,11 @@ class Scene:
         for note in notes:
             warnings.warn(note, stacklevel=2)
         return Picture(arrays)
+
+
+def _one(name: str, out: np.ndarray | None) -> dict[str, np.ndarray] | None:
+    """What a call fills that returns one array."""
+    return None if out is None else {name: out}
 
 
 def _reopen(path: str, cache: str, adapter: str) -> Scene:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ._arrays import as_array, floats
+from ._arrays import as_array, floats, once
 from ._arrays import faces as as_faces
 from ._scene import INVALID_ID, Scene
 
@@ -134,26 +134,33 @@ class RaycastingScene:
         return scene.test_occlusions(bounded)
 
     def count_intersections(self, rays: Any, nthreads: int = 0) -> np.ndarray:
-        """How many triangles each of rays (..., 6) meets: int32 (...)."""
-        scene, _ = self._built()
-        return scene.count_intersections(_rays(rays)).astype(np.int32)
+        """How often each of rays (..., 6) meets the meshes: int32 (...). Where triangles of a mesh touch it counts
+        once.
+        """
+        splits = self.list_intersections(rays)["ray_splits"]
+        return np.diff(splits.astype(np.int64)).astype(np.int32).reshape(np.shape(_rays(rays))[:-1])
 
     def list_intersections(self, rays: Any, nthreads: int = 0) -> dict[str, np.ndarray]:
         """All that rays (..., 6) meet, h hits of n rays.
 
         Returns ``ray_splits`` uint32 (n + 1), ``ray_ids`` uint32 (h,), ``t_hit`` float32 (h,), ``geometry_ids`` and
         ``primitive_ids`` uint32 (h,), ``primitive_uvs`` float32 (h, 2). Along a ray hits are in the order of distance.
+        Where triangles of a mesh touch a ray meets one of them.
         """
         scene, starts = self._built()
-        hits = scene.list_intersections(_rays(rays))
+        given = _rays(rays)
+        hits = scene.list_intersections(given)
         geometry, primitive = self._ids(hits["triangle"], starts)
+        kept = once(given.reshape(-1, 6).astype(np.float64), hits["ray_ids"], hits["t"])
+        kept[1:] |= geometry[1:] != geometry[:-1]
+        ray = hits["ray_ids"][kept]
         return {
-            "ray_splits": hits["ray_splits"].astype(np.uint32),
-            "ray_ids": hits["ray_ids"].astype(np.uint32),
-            "t_hit": hits["t"].astype(np.float32),
-            "geometry_ids": geometry,
-            "primitive_ids": primitive,
-            "primitive_uvs": hits["uv"],
+            "ray_splits": np.searchsorted(ray, np.arange(len(hits["ray_splits"]))).astype(np.uint32),
+            "ray_ids": ray.astype(np.uint32),
+            "t_hit": hits["t"][kept].astype(np.float32),
+            "geometry_ids": geometry[kept],
+            "primitive_ids": primitive[kept],
+            "primitive_uvs": hits["uv"][kept],
         }
 
     def compute_closest_points(self, query_points: Any, nthreads: int = 0) -> dict[str, np.ndarray]:

@@ -7,11 +7,12 @@ Locations are float64 and indices int64. Directions may have any length but none
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
 
-from ._arrays import floats
+from ._arrays import floats, once
 from ._scene import INVALID_ID, Scene
 
 
@@ -19,8 +20,8 @@ class RayMeshIntersector:
     """Rays and a mesh.
 
     ``geometry`` has ``vertices`` (n, 3) and ``faces`` (m, 3); or it is the vertices, and ``faces`` is given. The scene
-    is built at once, in a temporary file; what becomes of the mesh later is not noticed. ``scale_to_box`` has no
-    effect. ``cache`` and ``adapter`` are those of :meth:`brickwalk.Scene.from_arrays`.
+    is built by the first query, in a temporary file; what becomes of the mesh later is not noticed. ``scale_to_box``
+    has no effect. ``cache`` and ``adapter`` are those of :meth:`brickwalk.Scene.from_arrays`.
     """
 
     def __init__(
@@ -33,9 +34,19 @@ class RayMeshIntersector:
         adapter: str = "auto",
     ):
         self.mesh = geometry if faces is None else None
-        if faces is None:
-            geometry, faces = np.asarray(geometry.vertices, np.float64), np.asarray(geometry.faces, np.int64)
-        self.scene = Scene.from_arrays(geometry, faces, cache=cache, adapter=adapter)
+        self._given, self._options = (geometry, faces), {"cache": cache, "adapter": adapter}
+        self._lock, self._scene = threading.Lock(), None
+
+    @property
+    def scene(self) -> Scene:
+        """What answers."""
+        with self._lock:
+            if self._scene is None:
+                vertices, faces = self._given
+                if faces is None:
+                    vertices, faces = np.asarray(vertices.vertices, np.float64), np.asarray(vertices.faces, np.int64)
+                self._scene = Scene.from_arrays(vertices, faces, **self._options)
+            return self._scene
 
     def intersects_id(
         self,
@@ -49,14 +60,15 @@ class RayMeshIntersector:
         (h, 3). Hits are in the order of rays, and of distance along each.
 
         ``ray_origins`` and ``ray_directions`` have shape (n, 3). With ``multiple_hits`` all hits of a ray count, at
-        most the first ``max_hits`` where that is given; else the first.
+        most the first ``max_hits`` where that is given; else the first. Where triangles touch a ray hits one of them.
         """
         rays = _rays(ray_origins, ray_directions)
         if multiple_hits:
             hits = self.scene.list_intersections(rays)
-            ray, t, triangle = hits["ray_ids"], hits["t"], hits["triangle"]
+            kept = once(rays, hits["ray_ids"], hits["t"])
+            ray, t, triangle = (hits[name][kept] for name in ("ray_ids", "t", "triangle"))
             if max_hits is not None:
-                kept = np.arange(len(ray)) - hits["ray_splits"][ray] < max_hits
+                kept = np.arange(len(ray)) - np.searchsorted(ray, ray) < max_hits
                 ray, t, triangle = ray[kept], t[kept], triangle[kept]
         else:
             first = self.scene.cast_rays(rays)
@@ -84,11 +96,10 @@ class RayMeshIntersector:
         return self.scene.test_occlusions(_rays(ray_origins, ray_directions))
 
     def contains_points(self, points: Any) -> np.ndarray:
-        """Whether the mesh, which must be closed, contains points (n, 3): bool (n,).
-
-        Raises BrickwalkError for a mesh that is not closed.
+        """Whether the mesh contains points (n, 3): bool (n,). It should be closed; near holes points may be taken for
+        inside or outside.
         """
-        return self.scene.occupancy(_points("points", points))
+        return self.scene.occupancy(_points("points", points), allow_open=True)
 
 
 def _points(name: str, given: Any) -> np.ndarray:
