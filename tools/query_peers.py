@@ -8,8 +8,8 @@ they differ.
 
 A row is a query: medians of seconds over the turns, and how often a peer is as fast. Which of two answers is right is
 found by brute force over all triangles in f64, for at most --judged of those that differ. Excused is a ray that meets
-an edge to a thousandth of a triangle. So are hits that are as near to a part in 10^5: positions are rounded to a
-lattice, and rays to f32. The exit status is 1 where ours is neither right nor excused.
+an edge to a thousandth of a triangle, or to two steps of the lattice that positions are rounded to. So are hits that
+are as near to a part in 10^5. The exit status is 1 where ours is neither right nor excused.
 --threads 1 has brickwalk and Open3D use one thread; embreex always does.
 """
 
@@ -67,10 +67,13 @@ points = within(args.points).astype(np.float32)
 # Shares of a triangle's size and of a distance within which answers may differ.
 EDGE, NEAR = 1e-3, 1e-5
 corners = vertices[faces].astype(np.float64)
+# A step of the lattice that positions are rounded to, at most, and the longest sides of triangles.
+STEP = 2.0 ** (np.ceil(np.log2(np.abs(corners).max())) - 24)
+sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
 
 
 def brute(ray):
-    """Distances, triangles and least weights of all that a ray meets, in f64."""
+    """Distances, triangles and least weights, in margins, of all that a ray meets, in f64."""
     a, b, c = (corners[:, k] - ray[:3].astype(float) for k in range(3))
     d = ray[3:].astype(float)
     edges = np.stack([np.cross(b, c) @ d, np.cross(c, a) @ d, np.cross(a, b) @ d], axis=1)
@@ -78,9 +81,13 @@ def brute(ray):
     with np.errstate(divide="ignore", invalid="ignore"):
         weights = edges / total[:, None]
         t = np.einsum("ij,ij->i", a, np.cross(b, c)) / total
-    near = (weights.min(1) > -EDGE) & np.isfinite(t) & (t > -EDGE)
+    # What two steps are of a triangle's least height, as the ray sees it.
+    with np.errstate(divide="ignore"):
+        margins = EDGE + 2 * STEP * sides * np.linalg.norm(d) / np.abs(total)
+    least = weights.min(1) / margins
+    near = (least > -1) & np.isfinite(t) & (t > -NEAR)
     order = np.argsort(t[near])
-    return t[near][order], np.flatnonzero(near)[order], weights[near].min(1)[order]
+    return t[near][order], np.flatnonzero(near)[order], least[near][order]
 
 
 def judge_hits(rays, mine, theirs):
@@ -90,7 +97,7 @@ def judge_hits(rays, mine, theirs):
     right = [0, 0]
     for ray in chosen:
         t, triangles, least = brute(rays[ray])
-        surely = np.flatnonzero(least > EDGE)
+        surely = np.flatnonzero((least > 1) & (t > NEAR))
         limit = t[surely[0]] if len(surely) else np.inf
         # Edges before the first certain hit, and what lies as near as that.
         allowed = set(triangles[t <= limit * (1 + NEAR) + NEAR])
@@ -107,7 +114,7 @@ def judge_counts(rays, mine, theirs):
     right = [0, 0]
     for ray in chosen:
         t, _, least = brute(rays[ray])
-        certain = ((least > EDGE) & (t > EDGE)).sum()
+        certain = ((least > 1) & (t > NEAR)).sum()
         for side, found in enumerate((mine[ray], theirs[ray])):
             right[side] += certain <= found <= len(t)
     return len(differ), len(chosen), right
