@@ -28,6 +28,7 @@ const LEAST_STEP: f64 = 1.0 / (1u64 << 20) as f64;
 const MOVED: f64 = 1.0 / (1u64 << 51) as f64;
 /// The greatest ratio of an instance's scales for which its inverse is good enough.
 const MOST_RATIO: f64 = (1u64 << 20) as f64;
+
 /// A ray on its way. Distances along it are counted from `near`, in lengths of `direction`.
 pub(super) struct Aim {
     /// The given ray.
@@ -83,6 +84,10 @@ impl Local {
     #[inline(always)]
     fn above(&self, distance: f64) -> f32 {
         let t = (distance - self.from) * self.factor;
+        if t == f64::NEG_INFINITY {
+            // Before everything.
+            return -1.0;
+        }
         let t = t + t.abs() * ROUNDED + self.slack;
         if t >= f64::from(T_INFINITE) { T_INFINITE } else { t as f32 }
     }
@@ -115,6 +120,19 @@ impl Aim {
         self.scaled.scaled(t - self.start)
     }
 
+    /// No less than the distance along the ray of what is met at `t`, in lengths of the given direction. Of a ray from
+    /// far away a distance that small is rounded by much.
+    #[inline(always)]
+    fn limit(&self, t: f64) -> f64 {
+        if t == f64::NEG_INFINITY { t } else { self.along(t + t.abs() * MOVED) }
+    }
+
+    /// No more than the distance along the ray where its interval begins.
+    #[inline(always)]
+    fn begin(&self) -> f64 {
+        self.along(self.t_min - self.t_min * MOVED)
+    }
+
     /// Where the ray meets a triangle, in its interval. Distances that no f64 holds are the greatest that one does.
     #[inline(always)]
     pub(super) fn meet(&self, vertices: [DVec3; 3]) -> Option<Crossing> {
@@ -128,8 +146,8 @@ impl Aim {
 
     /// Whether what is entered at `from` may be met before `t`, which is in lengths of the given direction.
     pub(super) fn may_enter(&self, from: f64, t: f64) -> bool {
-        let t = self.along(t);
-        from <= t + t.abs() * ROUNDED
+        let limit = self.limit(t);
+        from <= limit + limit.abs() * ROUNDED
     }
 
     /// The ray in a frame in world directions that has its origin at `origin`, from `from` on.
@@ -137,7 +155,7 @@ impl Aim {
     fn local(&self, origin: DVec3, per_unit: f64, (from, step): (f64, f64)) -> Local {
         let at = ((self.near - origin) + self.scaled.direction * from) * per_unit;
         let ray = FramedRay { origin: at.as_vec3().to_array(), ..self.ray };
-        Local::new(ray, (per_unit, from, LEAST_STEP * step * per_unit), self.along(self.t_min))
+        Local::new(ray, (per_unit, from, LEAST_STEP * step * per_unit), self.begin())
     }
 
     /// The ray in the frame of a brick; `None` where f64 does not know it well enough.
@@ -165,7 +183,7 @@ impl Aim {
         let at = object.transform_point3(self.near + self.scaled.direction * from) - origin;
         let ray = boxed(at * per_unit, direction.direction);
         let factor = direction.scaled(1.0) * per_unit;
-        Some(Local::new(ray, (factor, from, LEAST_STEP * step * per_unit), self.along(self.t_min)))
+        Some(Local::new(ray, (factor, from, LEAST_STEP * step * per_unit), self.begin()))
     }
 
     /// Calls `visit` for the leaves of the top level that the ray may enter, about as it does, with where at the
@@ -183,7 +201,7 @@ impl Aim {
         }
         let unit = top.frame.unit;
         let local = self.local(top.frame.origin, top.per_unit, (0.0, top.step));
-        let mut limit = local.above(self.along(self.t_max));
+        let mut limit = local.above(self.limit(self.t_max));
         room.top.clear();
         room.top.push((local.ray.t_min, 0));
         while let Some((near, entry)) = room.top.pop() {
@@ -193,7 +211,7 @@ impl Aim {
             let index = match Child::of(entry) {
                 Child::Node(index) => index,
                 Child::Leaf(leaf) => {
-                    limit = local.above(self.along(visit(room, leaf, f64::from(near) * unit)));
+                    limit = local.above(self.limit(visit(room, leaf, f64::from(near) * unit)));
                     continue;
                 }
             };
@@ -228,7 +246,7 @@ impl Aim {
         };
         let view = &brick.geometry.view;
         let flip = local.ray.flip;
-        let mut limit = local.above(self.along(t_max));
+        let mut limit = local.above(self.limit(t_max));
         let mut group = Group::root(flip);
         room.groups.clear();
         loop {
@@ -248,7 +266,7 @@ impl Aim {
                 let triangle = node.triangle_base + triangles.trailing_zeros();
                 triangles &= triangles - 1;
                 let Some(t_max) = visit(triangle) else { return };
-                limit = local.above(self.along(t_max));
+                limit = local.above(self.limit(t_max));
             }
         }
     }
