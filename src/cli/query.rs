@@ -147,10 +147,7 @@ fn of_points(queries: &Queries, args: &QueryArgs, points: &[[f64; 3]], watch: &m
     Ok(match args.kind {
         Kind::Occupancy => Answers::Truths(queries.occupancy(points, args.allow_open, watch)?),
         Kind::SignedDistance => Answers::Distances(queries.signed_distance(points, args.allow_open, watch)?),
-        Kind::Distance => {
-            let closest = queries.closest_points(points, watch)?;
-            Answers::Distances(closest.into_iter().map(|closest| closest.distance).collect())
-        }
+        Kind::Distance => Answers::Distances(queries.distance(points, watch)?),
         _ => Answers::Closest(queries.closest_points(points, watch)?),
     })
 }

@@ -66,13 +66,21 @@ impl<'a> BrickView<'a> {
     /// The vertices of a triangle in f64, in device units of the object, relative to the brick's origin; exact.
     #[inline(always)]
     pub fn corners(&self, triangle: u32) -> [[f64; 3]; 3] {
-        let corner = |index: u32| {
-            let at = if self.is_wide { 6 } else { 3 } * index as usize;
-            let l = &self.vertices[at..at + if self.is_wide { 6 } else { 3 }];
-            // High and low part have 24 bits each and a common step.
-            [0, 1, 2].map(|k| f64::from(l[k]) + if self.is_wide { f64::from(l[3 + k]) } else { 0.0 })
-        };
-        self.indices.of(triangle).map(corner)
+        let [a, b, c] = self.indices.of(triangle);
+        [self.corner(a), self.corner(b), self.corner(c)]
+    }
+
+    #[inline(always)]
+    fn corner(&self, index: u32) -> [f64; 3] {
+        if !self.is_wide {
+            let at = 3 * index as usize;
+            let l = &self.vertices[at..at + 3];
+            return [f64::from(l[0]), f64::from(l[1]), f64::from(l[2])];
+        }
+        let at = 6 * index as usize;
+        let l = &self.vertices[at..at + 6];
+        // High and low part have 24 bits each and a common step.
+        [f64::from(l[0]) + f64::from(l[3]), f64::from(l[1]) + f64::from(l[4]), f64::from(l[2]) + f64::from(l[5])]
     }
 
     /// The vertices of a triangle in the object's frame.

@@ -1,10 +1,10 @@
 //! What rays meet first, or whether they meet anything: each from brick to brick, the nearest first.
 
+use super::aim::Aim;
 use super::hits::normal;
-use super::room::Room;
+use super::room::{Inner, Room};
 use super::rounds::{Bricks, Seek, State};
 use super::space::Placed;
-use super::walk::Aim;
 use super::{Queries, Watch};
 use crate::kernels::layout::NONE;
 use crate::kernels::opacity;
@@ -58,18 +58,25 @@ impl Seek for Casting<'_> {
         let is_met = |found: &Found| self.any && found.id != NONE;
         // The nearest brick that is away, and where it is entered.
         let mut next = (f64::INFINITY, NONE);
-        aim.leaves(isa, top, room, |room, leaf, from| {
-            let number = resident.leaves[leaf as usize].brick;
-            match bricks.get(number) {
-                State::AtHand(geometry) => {
-                    let brick = Placed::new(resident, leaf, geometry);
-                    self.go_through(isa, (ray, &aim), (leaf, &brick), from, found, room);
+        let Room { top: open, inner } = room;
+        aim.leaves(
+            isa,
+            top,
+            open,
+            #[inline(always)]
+            |leaf, from| {
+                let number = resident.leaves[leaf as usize].brick;
+                match bricks.get(number) {
+                    State::AtHand(geometry) => {
+                        let brick = Placed::new(resident, leaf, geometry);
+                        self.go_through(isa, (ray, &aim), (leaf, &brick), from, found, inner);
+                    }
+                    State::Away if from < next.0 => next = (from, number),
+                    _ => (),
                 }
-                State::Away if from < next.0 => next = (from, number),
-                _ => (),
-            }
-            if is_met(found) { f64::NEG_INFINITY } else { found.t.min(aim.t_max) }
-        });
+                if is_met(found) { f64::NEG_INFINITY } else { found.t.min(aim.t_max) }
+            },
+        );
         let matters = next.1 != NONE && !is_met(found) && aim.may_enter(next.0, found.t.min(aim.t_max));
         matters.then_some(next.1)
     }
@@ -85,23 +92,30 @@ impl Casting<'_> {
         (leaf, brick): (u32, &Placed),
         from: f64,
         found: &mut Found,
-        room: &mut Room,
+        room: &mut Inner,
     ) {
         let limit = found.t.min(aim.t_max);
-        aim.triangles(isa, brick, (from, limit), room, |triangle| {
-            let vertices = brick.vertices(triangle);
-            if let Some(Crossing { t, weights, .. }) = aim.meet(vertices) {
-                let (id, weights) = (brick.id(triangle), weights.map(|weight| weight as f32));
-                // Of what is as near, the lowest id.
-                if (t, id) < (found.t, found.id) && !self.passes(ray, brick, triangle, id, weights) {
-                    *found = Found { t, id, leaf, triangle, weights, normal: normal(vertices) };
-                    if self.any {
-                        return None;
+        aim.triangles(
+            isa,
+            brick,
+            (from, limit),
+            room,
+            #[inline(always)]
+            |triangle| {
+                let vertices = brick.vertices(triangle);
+                if let Some(Crossing { t, weights, .. }) = aim.meet(vertices) {
+                    let (id, weights) = (brick.id(triangle), weights.map(|weight| weight as f32));
+                    // Of what is as near, the lowest id.
+                    if (t, id) < (found.t, found.id) && !self.passes(ray, brick, triangle, id, weights) {
+                        *found = Found { t, id, leaf, triangle, weights, normal: normal(vertices) };
+                        if self.any {
+                            return None;
+                        }
                     }
                 }
-            }
-            Some(found.t.min(aim.t_max))
-        });
+                Some(found.t.min(aim.t_max))
+            },
+        );
     }
 
     #[inline(always)]

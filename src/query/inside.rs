@@ -73,7 +73,7 @@ impl Sweep for Crossed<'_> {
         let brick = at.1;
         let point = DVec3::from_array(self.points[item]);
         let (mut sum, mut count) = (0, 0);
-        brick.walk(&AlongX(point), &mut room.nodes, |triangle| {
+        brick.walk(&AlongX(point), &mut room.inner.nodes, |triangle| {
             let way = brick.handedness * crossed(point, brick.vertices(triangle));
             if way != 0 && self.by_id {
                 found.push((item, brick.id(triangle), way, 1));
@@ -144,12 +144,8 @@ impl Queries {
             watch(whole)
         };
         let inside = self.occupancy(points, is_open_allowed, &mut half)?;
-        let closest = self.closest_points(points, &mut half)?;
-        let signed = |(inside, closest): (bool, super::Closest)| match inside {
-            true => -closest.distance,
-            false => closest.distance,
-        };
-        Ok(inside.into_iter().zip(closest).map(signed).collect())
+        let distances = self.distance(points, &mut half)?;
+        Ok(inside.into_iter().zip(distances).map(|(inside, d)| if inside { -d } else { d }).collect())
     }
 }
 

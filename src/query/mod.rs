@@ -14,10 +14,12 @@
 //! | count, list | `rays.rs`, over `sweep.rs`: all bricks on the way, each once |
 //! | occupancy, signed distance | `inside.rs`: winding along an axis; `closed.rs` says whether it has a meaning |
 
+mod aim;
 mod cast;
 mod closed;
 mod hits;
 mod inside;
+mod near;
 mod nearest;
 mod rays;
 mod room;

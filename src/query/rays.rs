@@ -1,11 +1,11 @@
 //! All that rays meet: how many triangles, which, or whether any.
 
+use super::aim::Aim;
 use super::hits::Met;
 use super::room::Room;
 use super::space::{Placed, Slabs};
 use super::sweep::Sweep;
 use super::top::Top;
-use super::walk::Aim;
 use super::{Intersections, Queries, Watch};
 use crate::kernels::simd::isa::Isa;
 use crate::math::crossing::Crossing;
@@ -33,13 +33,20 @@ fn meet<I: Isa>(
     mut visit: impl FnMut(u32, [DVec3; 3], &Crossing),
 ) {
     let Some(aim) = Aim::new(top, ray) else { return };
-    aim.triangles(isa, brick, (0.0, aim.t_max), room, |triangle| {
-        let vertices = brick.vertices(triangle);
-        if let Some(met) = aim.meet(vertices) {
-            visit(triangle, vertices, &met);
-        }
-        Some(aim.t_max)
-    });
+    aim.triangles(
+        isa,
+        brick,
+        (0.0, aim.t_max),
+        &mut room.inner,
+        #[inline(always)]
+        |triangle| {
+            let vertices = brick.vertices(triangle);
+            if let Some(met) = aim.meet(vertices) {
+                visit(triangle, vertices, &met);
+            }
+            Some(aim.t_max)
+        },
+    );
 }
 
 /// Rays that list what they meet.

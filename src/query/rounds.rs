@@ -116,7 +116,7 @@ impl Queries {
         opacity: &[[u32; 4]],
         watch: &mut Watch,
     ) -> Result<Vec<S::Found>> {
-        let (resident, isa) = (self.scene.resident(), Best::detect());
+        let (resident, isa) = (self.scene.resident(), Best::for_one());
         let count = resident.exact_bricks() as u32;
         let mut sought: Vec<Sought<S::Found>> =
             items.iter().map(|_| Sought { found: nothing(), is_done: false }).collect();

@@ -3,15 +3,16 @@
 //! Vertices are those of the file, on their lattice, placed by the f64 matrix of their instance and rounded once.
 //! Boxes are grown by more than any rounding here, so that what misses a box meets nothing in it.
 
-use super::room::nearest_on_top;
+use super::near::{MARGIN, Near};
+use super::room::{Child, Inner};
+use super::walk::walk;
 use crate::kernels::payloads::BrickView;
+use crate::kernels::simd::isa::Isa;
 use crate::kernels::trace::node::inner_before;
 use crate::session::trace::Scaled;
 use bricks::{Brick, INSTANCE_IDENTITY, INSTANCE_MIRRORED, Instance, Node, Resident};
 use glam::DVec3;
 
-/// Of coordinates that took part: many times the f64 roundings of what is computed from them.
-const MARGIN: f64 = 1.0 / (1u64 << 46) as f64;
 /// Greatest inverse of a direction's component: times any coordinate it is finite.
 const MOST_INVERSE: f64 = f64::from_bits((900 + 1023) << 52);
 
@@ -36,14 +37,6 @@ impl<const N: usize> Boxes<N> {
         let reach = |axes: &[[f64; N]; 3]| axes.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
         let pad = MARGIN * reach(&min).max(reach(&max));
         Self { min, max, pad }
-    }
-
-    /// No less than the squared distance of `point` from any point in a box.
-    #[inline(always)]
-    pub(super) fn farthest_squared(&self, point: DVec3, i: usize) -> f64 {
-        let pad = self.pad.max(MARGIN * point.abs().max_element());
-        let far = |k: usize| (self.max[k][i] - point[k]).abs().max((point[k] - self.min[k][i]).abs()) + pad;
-        (far(0) * far(0) + far(1) * far(1) + far(2) * far(2)) * (1.0 + MARGIN)
     }
 
     /// No more than the squared distance of `point` from anything in each box.
@@ -200,15 +193,18 @@ impl<'a> Placed<'a> {
     pub(super) fn vertices(&self, triangle: u32) -> [DVec3; 3] {
         let &Geometry { origin, unit, ref view, .. } = self.geometry;
         let [a, b, c] = view.corners(triangle);
-        let at = |corner: [f64; 3]| self.world(origin + DVec3::from_array(corner) * unit);
-        [at(a), at(b), at(c)]
+        let [a, b, c] = [DVec3::from_array(a), DVec3::from_array(b), DVec3::from_array(c)];
+        [self.world(origin + a * unit), self.world(origin + b * unit), self.world(origin + c * unit)]
     }
 
     #[inline(always)]
     fn world(&self, p: DVec3) -> DVec3 {
         let Some(m) = self.matrix else { return p };
-        let row = |k: usize| m[4 * k] * p.x + m[4 * k + 1] * p.y + m[4 * k + 2] * p.z + m[4 * k + 3];
-        DVec3::new(row(0), row(1), row(2))
+        DVec3::new(
+            m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3],
+            m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
+            m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11],
+        )
     }
 
     /// The world's boxes of what the children of a node hold.
@@ -264,10 +260,43 @@ impl<'a> Placed<'a> {
         }
     }
 
-    /// Calls `visit` for the triangles of leaves no farther from `point` than `visit` last said, squared, nearer nodes
-    /// first. `open` is room to work in.
+    /// Calls `visit` for the triangles of leaves no farther from `point` than `within`, and than `visit` last said,
+    /// squared, about the nearest first.
     #[inline(always)]
-    pub(super) fn walk_near(
+    pub(super) fn walk_near<I: Isa>(
+        &self,
+        isa: I,
+        point: DVec3,
+        mut within: f64,
+        room: &mut Inner,
+        mut visit: impl FnMut(u32) -> f64,
+    ) {
+        let far = self.geometry.far.max_element();
+        let near = self.matrix.is_none().then(|| Near::new(point, self.geometry.origin, self.geometry.per_unit, far));
+        let Some(near) = near.flatten() else { return self.walk_near_wide(point, within, &mut room.near, visit) };
+        let mut limit = near.limit(within);
+        walk(
+            isa,
+            self.geometry.view.nodes,
+            &near,
+            limit,
+            &mut room.open,
+            #[inline(always)]
+            |triangles, _| {
+                for triangle in triangles {
+                    let now = visit(triangle);
+                    if now < within {
+                        (within, limit) = (now, near.limit(now));
+                    }
+                }
+                Some(limit)
+            },
+        );
+    }
+
+    /// [`Self::walk_near`] where boxes are asked in f64: those of instances, and from afar. `open` is room to work in.
+    #[cold]
+    fn walk_near_wide(
         &self,
         point: DVec3,
         mut within: f64,
@@ -301,16 +330,10 @@ impl<'a> Placed<'a> {
                     open.push((distances[slot], child(node, slot)));
                 }
             }
-            nearest_on_top(&mut open[before..]);
+            // The nearest on top.
+            open[before..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         }
     }
-}
-
-/// What a child of a node is: a node, or the first and the number of its triangles.
-#[derive(Clone, Copy)]
-pub(super) enum Child {
-    Node(u32),
-    Triangles(u32, u32),
 }
 
 /// The slots of a node that have a child, a bit each.

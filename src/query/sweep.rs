@@ -136,7 +136,7 @@ impl Queries {
         take: &mut dyn FnMut(S::Found),
         watch: &mut Watch,
     ) -> Result<()> {
-        let (resident, isa) = (self.scene.resident(), Best::detect());
+        let (resident, isa) = (self.scene.resident(), Best::for_one());
         let groups: Vec<&[Pair]> = pairs.chunk_by(|a, b| a.brick == b.brick).collect();
         let items: Vec<Item> = groups.iter().map(|group| Item::geometry(group[0].brick)).collect();
         self.store.for_each(&items, |place, payloads| {

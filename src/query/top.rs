@@ -1,8 +1,10 @@
-//! The wide top level, as queries walk it: boxes in f64, and in f32 about the scene's middle for rays.
+//! The wide top level, as queries walk it: boxes in f64, and in f32 about the scene's middle.
 
-use super::room::{Room, nearest_on_top};
+use super::near::Near;
 use super::space::{Boxes, Meets, children};
+use super::walk::{Open, walk};
 use crate::kernels::frame::{Frame, Placement};
+use crate::kernels::simd::isa::Isa;
 use crate::kernels::trace::node::inner_before;
 use crate::session::trace::Surroundings;
 use bricks::{Node, Resident, TopNode8};
@@ -22,6 +24,8 @@ pub(super) struct Top {
     pub(super) per_unit: f64,
     /// World units of a step of the lattice.
     pub(super) step: f64,
+    /// The greatest coordinate of anything in the scene.
+    far: f64,
 }
 
 /// What a child of a node is.
@@ -40,32 +44,13 @@ pub(super) fn child(node: &Node, slot: usize) -> Child {
     Child::Leaf(node.triangle_base + u32::from(node.meta[slot] & 31))
 }
 
-/// In a number of what is left to be visited: it is a leaf.
-const LEAF: u32 = 1 << 31;
-
-impl Child {
-    /// As a number.
-    #[inline(always)]
-    pub(super) fn number(self) -> u32 {
-        match self {
-            Self::Node(node) => node,
-            Self::Leaf(leaf) => leaf | LEAF,
-        }
-    }
-
-    /// Of a number.
-    #[inline(always)]
-    pub(super) fn of(number: u32) -> Self {
-        if number & LEAF != 0 { Self::Leaf(number & !LEAF) } else { Self::Node(number) }
-    }
-}
-
 impl Top {
     pub(super) fn new(resident: &Resident) -> Self {
         let step = f64::from(resident.objects[0].step_log2).exp2();
-        let middle = resident.top2.first().map_or(DVec3::ZERO, |root| {
-            DVec3::from_array([0, 1, 2].map(|k| 0.5 * (root.min[k] as f64 + root.max[k] as f64) * step))
+        let corners = resident.top2.first().map_or([DVec3::ZERO; 2], |root| {
+            [root.min, root.max].map(|corner| DVec3::from_array(corner.map(|x| x as f64)) * step)
         });
+        let middle = 0.5 * (corners[0] + corners[1]);
         let frame = Frame::near(resident, middle);
         let boxes = |node: &TopNode8| {
             let grid = |bounds: &[[u8; 8]; 3]| {
@@ -83,6 +68,7 @@ impl Top {
             frame,
             surroundings: Surroundings::new(resident),
             step,
+            far: corners[0].abs().max(corners[1].abs()).max_element(),
         }
     }
 
@@ -123,52 +109,47 @@ impl Top {
     }
 
     /// Calls `visit` for the leaves that may hold what is nearest to `point`, with no more than their distance from it,
-    /// squared; about the nearest first, and none farther than `within`, squared, or than `visit` last said. `counts`
-    /// says of a leaf whether what lies in it may be that.
+    /// squared; about the nearest first, and none farther than `within`, squared, and than `visit` last said. `open` is
+    /// room to work in.
     #[inline(always)]
-    pub(super) fn near_leaves(
+    pub(super) fn near_leaves<I: Isa>(
         &self,
+        isa: I,
         point: DVec3,
-        mut within: f64,
-        room: &mut Room,
-        counts: impl Fn(u32) -> bool,
-        mut visit: impl FnMut(&mut Room, u32, f64) -> f64,
+        within: f64,
+        open: &mut Vec<Open>,
+        mut visit: impl FnMut(u32, f64) -> f64,
     ) {
-        room.near.clear();
-        if !self.nodes.is_empty() {
-            room.near.push((0.0, Child::Node(0).number()));
-        }
-        while let Some((distance, number)) = room.near.pop() {
-            if distance > within {
-                continue;
-            }
-            let index = match Child::of(number) {
-                Child::Node(index) => index,
-                Child::Leaf(leaf) => {
-                    within = visit(room, leaf, distance).min(within);
-                    continue;
-                }
-            };
-            let (node, boxes) = (&self.nodes[index as usize], &self.boxes[index as usize]);
-            let before = room.near.len();
+        let Some(near) = Near::new(point, self.frame.origin, self.per_unit, self.far) else {
+            return self.leaves_from_afar(point, within, visit);
+        };
+        walk(
+            isa,
+            &self.nodes,
+            &near,
+            near.limit(within),
+            open,
+            #[inline(always)]
+            |leaf, least| Some(near.limit(visit(leaf.start, near.squared(least)))),
+        );
+    }
+
+    /// [`Self::near_leaves`] of a point that is too far away for the frame: all leaves in f64, the nearest first.
+    #[cold]
+    fn leaves_from_afar(&self, point: DVec3, mut within: f64, mut visit: impl FnMut(u32, f64) -> f64) {
+        let of_node = |(node, boxes): (&Node, &Boxes<8>)| {
             let distances = boxes.distances_squared(point);
-            let mut left = children(node);
-            while left != 0 {
-                let slot = left.trailing_zeros() as usize;
-                left &= left - 1;
-                if distances[slot] <= within {
-                    let child = child(node, slot);
-                    if let Child::Leaf(leaf) = child {
-                        if !counts(leaf) {
-                            continue;
-                        }
-                        // Something lies in it.
-                        within = within.min(boxes.farthest_squared(point, slot));
-                    }
-                    room.near.push((distances[slot], child.number()));
-                }
+            let slots = (0..8).filter(|&slot| node.meta[slot] != 0);
+            slots.map(|slot| (distances[slot], child(node, slot))).collect::<Vec<_>>()
+        };
+        let mut all: Vec<_> = self.nodes.iter().zip(&self.boxes).flat_map(of_node).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (least, child) in all {
+            if let Child::Leaf(leaf) = child
+                && least <= within
+            {
+                within = visit(leaf, least);
             }
-            nearest_on_top(&mut room.near[before..]);
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::kernels::frame::Frame;
 use crate::kernels::layout;
 use crate::kernels::layout::T_INFINITE;
 use crate::output::npy::Ray;
-use anyhow::{Result, bail};
+use anyhow::{Error, Result, anyhow};
 use bricks::Resident;
 use glam::DVec3;
 
@@ -25,17 +25,22 @@ const MOST_MOVES: usize = 50;
 ///
 /// # Errors
 /// What is wrong with it.
+#[inline]
 pub fn check(ray: &Ray) -> Result<()> {
-    if !ray.origin.iter().chain(&ray.direction).all(|x| x.is_finite()) {
-        bail!("origin and direction must be finite");
+    let (origin, direction) = (DVec3::from_array(ray.origin), DVec3::from_array(ray.direction));
+    let is_finite = origin.is_finite() & direction.is_finite();
+    let has_interval = !(ray.t_min.is_nan() | ray.t_max.is_nan());
+    if is_finite & (direction != DVec3::ZERO) & has_interval { Ok(()) } else { Err(flaw(is_finite, has_interval)) }
+}
+
+/// What is wrong with a ray.
+#[cold]
+fn flaw(is_finite: bool, has_interval: bool) -> Error {
+    match (is_finite, has_interval) {
+        (false, _) => anyhow!("origin and direction must be finite"),
+        (true, false) => anyhow!("t_min and t_max must be numbers"),
+        (true, true) => anyhow!("the direction has no length"),
     }
-    if ray.direction == [0.0; 3] {
-        bail!("the direction has no length");
-    }
-    if ray.t_min.is_nan() || ray.t_max.is_nan() {
-        bail!("t_min and t_max must be numbers");
-    }
-    Ok(())
 }
 
 /// 2^`log2`, which is a normal number.
@@ -67,6 +72,7 @@ pub struct Scaled {
 
 impl Scaled {
     /// Of a direction that has a length.
+    #[inline]
     pub fn of(direction: [f64; 3]) -> Self {
         let largest = direction.iter().fold(0.0f64, |m, d| m.max(d.abs()));
         let log2 = exponent(largest);
@@ -75,12 +81,14 @@ impl Scaled {
     }
 
     /// A distance in lengths of the scaled direction, `t` in those of the given one.
+    #[inline]
     pub fn scaled(&self, t: f64) -> f64 {
         let [a, b] = halves(self.log2);
         t * a * b
     }
 
     /// A distance in lengths of the given direction, `t` in those of the scaled one.
+    #[inline]
     pub fn given(&self, t: f64) -> f64 {
         let [a, b] = halves(-self.log2);
         t * a * b
@@ -116,18 +124,34 @@ impl Surroundings {
         Some(Self { min, max, reach: (max - min).length().max(step) })
     }
 
+    /// Whether a point is in the scene's bounds, or not farther from them than their diagonal.
+    #[inline(always)]
+    fn has_near(&self, p: DVec3) -> bool {
+        p.cmpge(self.min - self.reach).all() && p.cmple(self.max + self.reach).all()
+    }
+
+    /// Where `ray` comes near the scene, and the way there in lengths of its direction, as of [`Self::approach`].
+    #[inline(always)]
+    pub fn near(&self, ray: &Ray) -> Option<(DVec3, f64)> {
+        let origin = DVec3::from_array(ray.origin);
+        if self.has_near(origin) {
+            return Some((origin, 0.0));
+        }
+        let approach = self.approach(ray)?;
+        Some((DVec3::from_array(approach.ray.origin), approach.start))
+    }
+
     /// `ray` from where it comes near the scene; `None` if it never does. A ray that starts in the scene's bounds, or
     /// not farther from them than their diagonal, is as it was.
     pub fn approach(&self, ray: &Ray) -> Option<Approach> {
         let &Self { min, max, reach } = self;
-        let is_near = |p: DVec3| p.cmpge(min - reach).all() && p.cmple(max + reach).all();
-        if is_near(DVec3::from_array(ray.origin)) {
+        if self.has_near(DVec3::from_array(ray.origin)) {
             return Some(Approach { ray: *ray, start: 0.0 });
         }
         let scaled = Scaled::of(ray.direction);
         let (mut origin, mut way) = (DVec3::from_array(ray.origin), 0.0);
         for _ in 0..MOST_MOVES {
-            if is_near(origin) {
+            if self.has_near(origin) {
                 break;
             }
             let margin = MARGIN * reach + SLAB_ERROR * origin.abs().max_element();

@@ -50,6 +50,11 @@ pub fn closest(held: &mut Held, points: &[[f64; 3]], task: &Task) -> Result<Vec<
     held.ask(|queries| queries.closest_points(points, &mut watch(task)))
 }
 
+/// Distances.
+pub fn distance(held: &mut Held, points: &[[f64; 3]], task: &Task) -> Result<Vec<f64>> {
+    held.ask(|queries| queries.distance(points, &mut watch(task)))
+}
+
 /// Which points are inside.
 pub fn occupancy(held: &mut Held, points: &[[f64; 3]], open: bool, task: &Task) -> Result<Vec<bool>> {
     held.ask(|queries| queries.occupancy(points, open, &mut watch(task)))

@@ -45,28 +45,19 @@ impl Named {
     }
 }
 
-fn numbers<const N: usize, T: Copy + Into<f64>>(view: ArrayView2<T>, rows: Range<usize>) -> Vec<[f64; N]> {
-    let columns = view.ncols().min(N);
-    let mut all = Vec::with_capacity(rows.len());
-    if let (Some(numbers), true) = (view.as_slice(), columns == view.ncols() && columns > 0) {
-        let rows = numbers[rows.start * columns..rows.end * columns].chunks_exact(columns);
-        all.extend(rows.map(|row| {
-            let mut numbers = [0.0; N];
-            for (&from, to) in row.iter().zip(&mut numbers) {
-                *to = from.into();
-            }
-            numbers
-        }));
-        return all;
+/// Appends what `make` makes of `rows`, each of `N` numbers, as many as there are columns.
+fn append<const N: usize, T: Copy + Into<f64>, R>(
+    view: ArrayView2<T>,
+    rows: Range<usize>,
+    make: impl Fn([f64; N]) -> R,
+    to: &mut Vec<R>,
+) {
+    if let Some(numbers) = view.as_slice() {
+        let (rows, _) = numbers[rows.start * N..rows.end * N].as_chunks();
+        to.extend(rows.iter().map(|row| make(row.map(T::into))));
+    } else {
+        to.extend(rows.map(|row| make(std::array::from_fn(|column| view[(row, column)].into()))));
     }
-    for row in rows {
-        let mut numbers = [0.0; N];
-        for (column, number) in numbers[..columns].iter_mut().enumerate() {
-            *number = view[(row, column)].into();
-        }
-        all.push(numbers);
-    }
-    all
 }
 
 impl<'py> Rows<'py> {
@@ -93,57 +84,57 @@ impl<'py> Rows<'py> {
         (shape[0], shape[1])
     }
 
-    /// `rows` of them, each of `N` numbers; those that there are no columns for are 0.
-    fn numbers<const N: usize>(&self, rows: Range<usize>) -> PyResult<Vec<[f64; N]>> {
-        if rows.end > self.shape().0 {
+    /// Appends what `make` makes of `rows` of them, each of `N` numbers, as many as there are columns.
+    fn append<const N: usize, R>(
+        &self,
+        rows: Range<usize>,
+        make: impl Fn([f64; N]) -> R,
+        to: &mut Vec<R>,
+    ) -> PyResult<()> {
+        let (count, columns) = self.shape();
+        if rows.end > count || columns != N {
             return Err(wrong("the array has been resized meanwhile"));
         }
         let changed = |error: numpy::BorrowError| wrong(format!("the array cannot be read: {error}"));
-        Ok(match self {
-            Self::Single(array) => numbers(array.try_readonly().map_err(changed)?.as_array(), rows),
-            Self::Double(array) => numbers(array.try_readonly().map_err(changed)?.as_array(), rows),
-        })
+        match self {
+            Self::Single(array) => append(array.try_readonly().map_err(changed)?.as_array(), rows, make, to),
+            Self::Double(array) => append(array.try_readonly().map_err(changed)?.as_array(), rows, make, to),
+        }
+        Ok(())
     }
 
-    /// Rays: origin, direction, and where there are eight columns the least and the greatest distance.
+    /// Appends rays: origin, direction, and where there are eight columns the least and the greatest distance.
     ///
     /// # Errors
     /// There are neither six nor eight columns.
-    pub fn rays(&self, rows: Range<usize>) -> PyResult<Vec<Ray>> {
-        let has_interval = match self.shape().1 {
-            6 => false,
-            8 => true,
-            other => return Err(wrong(format!("rays have 6 or 8 numbers each, not {other}"))),
-        };
-        let ray = |[a, b, c, d, e, f, near, far]: [f64; 8]| Ray {
-            origin: [a, b, c],
-            direction: [d, e, f],
-            t_min: near,
-            t_max: if has_interval { far } else { f64::INFINITY },
-        };
-        Ok(self.numbers(rows)?.into_iter().map(ray).collect())
+    pub fn rays(&self, rows: Range<usize>, to: &mut Vec<Ray>) -> PyResult<()> {
+        let ray =
+            |[a, b, c, d, e, f, t_min, t_max]: [f64; 8]| Ray { origin: [a, b, c], direction: [d, e, f], t_min, t_max };
+        match self.shape().1 {
+            6 => self.append(rows, |[a, b, c, d, e, f]: [f64; 6]| ray([a, b, c, d, e, f, 0.0, f64::INFINITY]), to),
+            8 => self.append(rows, ray, to),
+            other => Err(wrong(format!("rays have 6 or 8 numbers each, not {other}"))),
+        }
     }
 
-    /// Points.
+    /// Appends points.
     ///
     /// # Errors
     /// There are not three columns.
-    pub fn points(&self, rows: Range<usize>) -> PyResult<Vec<[f64; 3]>> {
+    pub fn points(&self, rows: Range<usize>, to: &mut Vec<[f64; 3]>) -> PyResult<()> {
         match self.shape().1 {
-            3 => self.numbers(rows),
+            3 => self.append(rows, |point| point, to),
             other => Err(wrong(format!("points have 3 numbers each, not {other}"))),
         }
     }
 
-    /// Pairs of points.
+    /// Appends pairs of points.
     ///
     /// # Errors
     /// There are not six columns.
-    pub fn pairs(&self, rows: Range<usize>) -> PyResult<Vec<[[f64; 3]; 2]>> {
+    pub fn pairs(&self, rows: Range<usize>, to: &mut Vec<[[f64; 3]; 2]>) -> PyResult<()> {
         match self.shape().1 {
-            6 => {
-                Ok(self.numbers(rows)?.into_iter().map(|[a, b, c, d, e, f]: [f64; 6]| [[a, b, c], [d, e, f]]).collect())
-            }
+            6 => self.append(rows, |[a, b, c, d, e, f]: [f64; 6]| [[a, b, c], [d, e, f]], to),
             other => Err(wrong(format!("pairs have 6 numbers each, not {other}"))),
         }
     }
@@ -156,8 +147,9 @@ impl<'py> Rows<'py> {
         let count = self.shape().0;
         for start in (0..count).step_by(CHECKED) {
             py.check_signals()?;
-            bad_point(start, &self.points(start..count.min(start + CHECKED))?, named)
-                .map_or(Ok(()), |text| Err(wrong(text)))?;
+            let mut points = Vec::new();
+            self.points(start..count.min(start + CHECKED), &mut points)?;
+            bad_point(start, &points, named).map_or(Ok(()), |text| Err(wrong(text)))?;
         }
         Ok(())
     }

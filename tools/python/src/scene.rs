@@ -7,7 +7,7 @@ use crate::render;
 use crate::rows::{Named, Rows, bad_pair, bad_point, bad_ray};
 use crate::worker::{Desk, Progress, Task, Worker, run_alone};
 use anyhow::Result;
-use bricks::SceneFile;
+use bricks::{Access, SceneFile};
 use brickwalk::counters::Counters;
 use brickwalk::session::{Hit, Ray};
 use brickwalk::settings::{Adapter, CacheSize};
@@ -23,6 +23,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// twice.
 const MOST: usize = 1 << 22;
 
+/// Rows that are read and then checked, while they are near.
+const CHECKED: usize = 1 << 10;
+
 /// A scene that is open. Threads may share it: their jobs are done in turn.
 #[pyclass(frozen, module = "brickwalk._brickwalk")]
 pub struct Core {
@@ -35,8 +38,8 @@ pub struct Core {
 
 /// Says of items that begin at a row which is the first that is none, and why.
 type Bad<R> = fn(usize, &[R], &Named) -> Option<String>;
-/// Reads some of the rows.
-type Read<'py, R> = fn(&Rows<'py>, Range<usize>) -> PyResult<Vec<R>>;
+/// Appends some of the rows.
+type Read<'py, R> = fn(&Rows<'py>, Range<usize>, &mut Vec<R>) -> PyResult<()>;
 
 /// What becomes of rows.
 struct Job<'py, 'a, R> {
@@ -59,10 +62,15 @@ impl<'py, R: Send + 'static> Job<'py, '_, R> {
         let desk = self.core.desk()?;
         let (count, _) = self.rows.shape();
         let parts = || (0..count).step_by(MOST).map(|start| start..count.min(start + MOST));
-        let read = |part: Range<usize>| {
+        let read = |part: Range<usize>| -> PyResult<Vec<R>> {
             py.check_signals()?;
-            let given = (self.read)(&self.rows, part.clone())?;
-            (self.bad)(part.start, &given, &self.named).map_or(Ok(given), |text| Err(wrong(text)))
+            let mut given = Vec::with_capacity(part.len());
+            for start in part.clone().step_by(CHECKED) {
+                (self.read)(&self.rows, start..part.end.min(start + CHECKED), &mut given)?;
+                let read = &given[start - part.start..];
+                (self.bad)(start, read, &self.named).map_or(Ok(()), |text| Err(wrong(text)))?;
+            }
+            Ok(given)
         };
         // Nothing is done before all is known to be good.
         if count > MOST {
@@ -161,7 +169,8 @@ impl Core {
         let cache: CacheSize = cache.parse().map_err(|why| wrong(format!("cache {cache:?}: {why}")))?;
         let Ok(adapter) = adapter.parse::<Adapter>();
         let file = path.clone();
-        let open = move |_: &Arc<Task>| Ok(Arc::new(SceneFile::open(file)?));
+        // What is read of a map would count as memory of the process.
+        let open = move |_: &Arc<Task>| Ok(Arc::new(SceneFile::open_with(file, Access::Read)?));
         let scene = run_alone(py, &mut Progress::new(None, 0), open)?;
         let (options, done) = (Options { path, cache, adapter }, Shared::default());
         let worker = Mutex::new(Some(start(&options, &scene, &done)?));
@@ -342,6 +351,19 @@ impl Core {
         let work = move |held: &mut Held, points: &[[f64; 3]], task: &Task| query::occupancy(held, points, open, task);
         let take = |start, found: Vec<bool>| write(inside, start, found.into_iter());
         self.points(points, shape, progress)?.run(py, work, take)
+    }
+
+    /// Fills an array with distances.
+    fn distance<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        shape: Vec<usize>,
+        distance: &Bound<'py, PyArray1<f64>>,
+        progress: Told<'py>,
+    ) -> PyResult<()> {
+        let take = |start, found: Vec<f64>| write(distance, start, found.into_iter());
+        self.points(points, shape, progress)?.run(py, query::distance, take)
     }
 
     /// Fills an array with distances, negative inside.

@@ -52,6 +52,9 @@ class Core:
     def occupancy(
         self, points: Rows, shape: tuple[int, ...], inside: NDArray[np.bool_], open: bool, progress: Progress
     ) -> None: ...
+    def distance(
+        self, points: Rows, shape: tuple[int, ...], distance: NDArray[np.float64], progress: Progress
+    ) -> None: ...
     def signed_distance(
         self, points: Rows, shape: tuple[int, ...], distance: NDArray[np.float64], open: bool, progress: Progress
     ) -> None: ...

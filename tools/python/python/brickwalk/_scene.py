@@ -272,7 +272,12 @@ class Scene:
         """The distances of points (..., 3) from the scene, in its units: float64 (...), or ``out``, which is of that
         dtype and shape. Raises as :meth:`closest_points`.
         """
-        return self.closest_points(points, out=_one("distance", out), progress=progress)["distance"]
+        rows, lead = floats(points, "points", (3,))
+        check_progress(progress)
+        core = self._check()
+        results = Results(_one("distance", out), lead, {"distance": (np.float64, ())})
+        core.distance(rows, lead, results.flat["distance"], progress)
+        return results.finish()["distance"]
 
     def signed_distance(
         self,
