@@ -1,5 +1,10 @@
 #!/usr/bin/env python3
-"""Prints the licences of all crates that the program is made of, for a target: names, versions, texts."""
+"""Prints the licences of all crates that the program is made of, for a target: names, versions, texts.
+
+    tools/licences.py TARGET [PACKAGE]
+
+PACKAGE is another one of the workspace than brickwalk: brickwalk-python.
+"""
 
 import json
 import pathlib
@@ -7,20 +12,18 @@ import subprocess
 import sys
 
 
-def crates(target):
-    """The crates of the program, without those that only build or test it."""
-    command = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", target]
-    metadata = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
-    packages = {package["id"]: package for package in metadata["packages"]}
-    nodes = {node["id"]: node for node in metadata["resolve"]["nodes"]}
-    found, waiting = set(), [metadata["resolve"]["root"]]
-    while waiting:
-        crate = waiting.pop()
-        if crate not in found:
-            found.add(crate)
-            used = [d for d in nodes[crate]["deps"] if any(kind["kind"] is None for kind in d["dep_kinds"])]
-            waiting += [dependency["pkg"] for dependency in used]
-    of_others = [packages[crate] for crate in found if packages[crate]["source"]]
+def output(*command):
+    return subprocess.run(["cargo", *command], check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def crates(target, package="brickwalk"):
+    """The crates that a package is made of, without those that only build or test it."""
+    tree = output(
+        "tree", "--locked", "--package", package, "--target", target, "--edges", "normal", "--prefix", "none"
+    )
+    used = {tuple(line.split()[:2]) for line in tree.splitlines()}
+    metadata = json.loads(output("metadata", "--locked", "--format-version", "1", "--filter-platform", target))
+    of_others = [p for p in metadata["packages"] if p["source"] and (p["name"], f"v{p['version']}") in used]
     return sorted(of_others, key=lambda package: (package["name"], package["version"]))
 
 
@@ -35,7 +38,7 @@ def texts(package):
 def main():
     users = {}
     print("brickwalk is made with these crates. Texts of their licences follow.\n")
-    for package in crates(sys.argv[1]):
+    for package in crates(*sys.argv[1:]):
         name = f"{package['name']} {package['version']}"
         print(f"{name}: {package['license'] or 'see its text'}")
         for text in texts(package):

@@ -21,6 +21,12 @@ fi
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check \
     'maturin>=1.8,<2' numpy pytest hypothesis trimesh rtree scipy pillow
 
+# What the library is made of goes into the wheel.
+host=$(rustc -vV | sed -n 's/^host: //p')
+package=$root/tools/python/python/brickwalk
+"$environment/bin/python" "$root/tools/licences.py" "$host" brickwalk-python >"$package/THIRD-PARTY.txt"
+cp "$root/LICENSE-MIT" "$root/LICENSE-APACHE" "$package/"
+
 # Nothing that is built here goes into a debugger.
 export CARGO_PROFILE_RELEASE_DEBUG=false
 wheels=$target/python/wheels
