@@ -15,6 +15,8 @@ const ROUNDING: f64 = f64::EPSILON / 2.0;
 /// from the factors, 4 from products and sums within a 2x2 minor and its product with the third factor, 2 from adding
 /// up; doubled against terms of higher order.
 const TRIPLE_ERROR: f64 = 24.0 * ROUNDING;
+/// More than what sums of small numbers are off by, which f64 rounds to multiples of 2^-1074.
+const UNDERFLOW: f64 = f64::MIN_POSITIVE;
 
 /// A ray's line, whose origin is given relative to a reference point, so that nothing is rounded. All are finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,8 +136,9 @@ fn by_plane(line: &Line, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
     let (numerator, determinant) = (normal.dot(from), normal.dot(d));
     // Each component of the normal is wrong by four roundings of its permanent, each sum by three more.
     let spread = permanent(u.abs(), v.abs());
-    let determinant_error = 8.0 * ROUNDING * spread.dot(d.abs());
-    let numerator_error = 8.0 * ROUNDING * spread.dot(from.abs()) + 2.0 * ROUNDING * normal.abs().dot(reach);
+    let determinant_error = 8.0 * ROUNDING * spread.dot(d.abs()) + UNDERFLOW;
+    let numerator_error =
+        8.0 * ROUNDING * spread.dot(from.abs()) + 2.0 * ROUNDING * normal.abs().dot(reach) + UNDERFLOW;
     let relative_error = numerator_error / numerator.abs() + determinant_error / determinant.abs() + 2.0 * ROUNDING;
     let t = numerator / determinant;
     let t_error = 2.0 * relative_error * t.abs();
@@ -169,7 +172,7 @@ fn surely_meets(line: &Line, reach: f64, [a, b, c]: [DVec3; 3]) -> Option<bool> 
     let most = a.abs().max(b.abs()).max(c.abs()).max_element() + reach;
     let [a, b, c] = [a - origin, b - origin, c - origin];
     // A permanent has two products in each component, and none of their factors is above `most`.
-    let error = TRIPLE_ERROR * 2.0 * most * most * (d.x.abs() + d.y.abs() + d.z.abs());
+    let error = TRIPLE_ERROR * 2.0 * most * most * (d.x.abs() + d.y.abs() + d.z.abs()) + UNDERFLOW;
     let edges = [d.dot(b.cross(c)), d.dot(c.cross(a)), d.dot(a.cross(b))];
     let least = edges[0].min(edges[1]).min(edges[2]);
     let greatest = edges[0].max(edges[1]).max(edges[2]);
@@ -187,7 +190,7 @@ pub fn crossing(line: &Line, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
     let d = DVec3::from(line.direction);
     let normals = [b.cross(c), c.cross(a), a.cross(b)];
     let edges = normals.map(|n| d.dot(n));
-    let errors = [(mb, mc), (mc, ma), (ma, mb)].map(|(p, q)| TRIPLE_ERROR * d.abs().dot(permanent(p, q)));
+    let errors = [(mb, mc), (mc, ma), (ma, mb)].map(|(p, q)| TRIPLE_ERROR * d.abs().dot(permanent(p, q)) + UNDERFLOW);
 
     // Two edges certain to have opposite signs: a miss, by far the most frequent case.
     let certain = |k: usize, sign: f64| edges[k] * sign > errors[k];
@@ -254,6 +257,34 @@ mod tests {
             met += u32::from(truth.is_some());
         }
         assert!(met > 9000 && decided[0] > 5000 && decided[1] > 5000, "{met} {decided:?}");
+    }
+
+    /// A direction of 2^-1060 of the length meets what the direction meets, also where products are rounded to
+    /// multiples of 2^-1074.
+    #[test]
+    fn signs_hold_where_numbers_are_least() {
+        let mut rng = crate::math::random::Rng(7);
+        let mut place = || [0; 3].map(|_| f64::from((512.0 * rng.signed()).round()) / 64.0);
+        let least = 2.0f64.powi(-1060);
+        let mut met = [0; 2];
+        for i in 0..3000 {
+            let (a, b, c, from, other) = (place(), place(), place(), place(), place());
+            // To a corner, and to somewhere else.
+            let to = if i % 2 == 0 { a } else { other };
+            let direction = [0, 1, 2].map(|k| to[k] - from[k]);
+            if direction == [0.0; 3] {
+                continue;
+            }
+            let is_met = |scale: f64| {
+                let line = line(from, direction.map(|d| d * scale));
+                let near = crossing_near(&line, 8.0, [a, b, c].map(DVec3::from)).is_some();
+                assert_eq!(near, crossing(&line, [a, b, c]).is_some());
+                near
+            };
+            assert_eq!(is_met(least), is_met(1.0), "{from:?} {direction:?} {a:?} {b:?} {c:?}");
+            met[i % 2] += usize::from(is_met(1.0));
+        }
+        assert!(met[0] > 1000 && (10..1000).contains(&met[1]), "{met:?}");
     }
 
     /// Where a line meets a plane is what whole numbers say, to its bound.
