@@ -272,12 +272,7 @@ class Scene:
         """The distances of points (..., 3) from the scene, in its units: float64 (...), or ``out``, which is of that
         dtype and shape. Raises as :meth:`closest_points`.
         """
-        rows, lead = floats(points, "points", (3,))
-        check_progress(progress)
-        core = self._check()
-        results = Results(_one("distance", out), lead, {"distance": (np.float64, ())})
-        core.distance(rows, lead, results.flat["distance"], progress)
-        return results.finish()["distance"]
+        return self._of_points("distance", np.float64, points, out, progress)
 
     def signed_distance(
         self,
@@ -292,12 +287,7 @@ class Scene:
 
         Raises as :meth:`occupancy`.
         """
-        rows, lead = floats(points, "points", (3,))
-        check_progress(progress)
-        core = self._check()
-        results = Results(_one("distance", out), lead, {"distance": (np.float64, ())})
-        core.signed_distance(rows, lead, results.flat["distance"], bool(allow_open), progress)
-        return results.finish()["distance"]
+        return self._of_points("signed_distance", np.float64, points, out, progress, bool(allow_open))
 
     def occupancy(
         self,
@@ -315,12 +305,18 @@ class Scene:
 
         Raises BrickwalkError that names a surface that is not closed, ValueError that names a point that is not finite.
         """
+        return self._of_points("occupancy", np.bool_, points, out, progress, bool(allow_open))
+
+    def _of_points(
+        self, query: str, dtype: Any, points: Any, out: np.ndarray | None, progress: Progress | None, *options: bool
+    ) -> np.ndarray:
+        """What a query says of each of points (..., 3): a number each."""
         rows, lead = floats(points, "points", (3,))
         check_progress(progress)
         core = self._check()
-        results = Results(_one("inside", out), lead, {"inside": (np.bool_, ())})
-        core.occupancy(rows, lead, results.flat["inside"], bool(allow_open), progress)
-        return results.finish()["inside"]
+        results = Results(_one(query, out), lead, {query: (dtype, ())})
+        getattr(core, query)(rows, lead, results.flat[query], *options, progress)
+        return results.finish()[query]
 
     def visibility(
         self, a: Any, b: Any, *, out: np.ndarray | None = None, progress: Progress | None = None
