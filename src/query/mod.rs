@@ -53,6 +53,12 @@ const UNKNOWN: u64 = 1 << 30;
 /// Bytes that a cache of everything has beside it, for what is in use.
 const BESIDE: u64 = 8 << 20;
 
+/// Rays or points that are answered at a time where bricks may have to be read again for the next.
+const BATCH: usize = 1 << 22;
+
+/// And where none has: what is known of so many stays in a processor's own caches.
+const NEAR_BATCH: usize = 1 << 16;
+
 /// Is told how many more items are done; 0 says that work goes on. An error ends the work and is handed back.
 pub type Watch<'a> = dyn FnMut(u64) -> Result<()> + 'a;
 
@@ -114,10 +120,7 @@ impl Queries {
     /// # Errors
     /// A thread cannot be started.
     pub fn new(scene: Arc<SceneFile>, cache: CacheSize, threads: usize) -> Result<Self> {
-        let bricks = 0..scene.resident().exact_bricks() as u32;
-        let bytes =
-            |brick| scene.loaded_bytes(Payload::Geometry(brick)) + scene.loaded_bytes(Payload::Attributes(brick));
-        let all: u64 = bricks.map(bytes).sum();
+        let all = all_bytes(&scene);
         let room = available_memory().map_or(UNKNOWN, |bytes| bytes / 4);
         let cache_bytes = cache.bytes(all + all / 2 + BESIDE, room);
         let name = |number| format!("query {number}");
@@ -131,6 +134,12 @@ impl Queries {
     /// The scene.
     pub fn scene(&self) -> &Arc<SceneFile> {
         &self.scene
+    }
+
+    /// How many rays or points are best given at a time, of those that are too many to be near together: fewer where
+    /// the cache keeps all bricks.
+    pub fn batch(&self) -> usize {
+        if self.store.keeps(all_bytes(&self.scene)) { NEAR_BATCH } else { BATCH }
     }
 
     /// The top level, made when it is first asked for.
@@ -150,6 +159,12 @@ impl Queries {
         let (payloads_read, bytes_read, most_bytes) = self.store.read();
         QueryStats { payloads_read, bytes_read, most_bytes }
     }
+}
+
+/// Bytes of the payloads of all bricks.
+fn all_bytes(scene: &SceneFile) -> u64 {
+    let bytes = |brick| scene.loaded_bytes(Payload::Geometry(brick)) + scene.loaded_bytes(Payload::Attributes(brick));
+    (0..scene.resident().exact_bricks() as u32).map(bytes).sum()
 }
 
 /// Refuses points that are not numbers.

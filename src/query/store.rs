@@ -45,6 +45,11 @@ impl Store {
         self.kept_bytes.max(self.batch_bytes)
     }
 
+    /// Whether it keeps `bytes` of payloads together.
+    pub(super) fn keeps(&self, bytes: u64) -> bool {
+        bytes <= self.kept_bytes
+    }
+
     /// How many of `items`, from the first on, are kept together; one at least.
     pub(super) fn together(&self, items: &[Item]) -> usize {
         let mut sum = 0;

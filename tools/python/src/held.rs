@@ -79,22 +79,37 @@ impl Held {
         Self { options, scene, session: None, queries: None, done }
     }
 
-    /// Asks about geometry, with a cache in host memory.
-    ///
-    /// # Errors
-    /// No thread; that of `ask`.
-    pub fn ask<T>(&mut self, ask: impl FnOnce(&Queries) -> Result<T>) -> Result<T> {
+    /// What is asked about geometry, with a cache in host memory.
+    fn queries(&mut self) -> Result<&Queries> {
         let queries = match self.queries.take() {
             Some(queries) => queries,
             None => Queries::new(self.scene.clone(), self.options.cache, 0)?,
         };
-        let queries = self.queries.insert(queries);
+        Ok(self.queries.insert(queries))
+    }
+
+    /// Begins a query, and says how many rows are best given to [`Self::ask`] at a time.
+    ///
+    /// # Errors
+    /// No thread.
+    pub fn begin(&mut self) -> Result<usize> {
+        let batch = self.queries()?.batch();
+        lock(&self.done).queries += 1;
+        Ok(batch)
+    }
+
+    /// Asks about geometry.
+    ///
+    /// # Errors
+    /// No thread; that of `ask`.
+    pub fn ask<T>(&mut self, ask: impl FnOnce(&Queries) -> Result<T>) -> Result<T> {
         let clock = Instant::now();
+        let queries = self.queries()?;
         let answer = ask(queries);
+        let stats = queries.stats();
         let mut done = lock(&self.done);
-        done.queries += 1;
         done.seconds += clock.elapsed().as_secs_f64();
-        done.queried = queries.stats();
+        done.queried = stats;
         answer
     }
 }

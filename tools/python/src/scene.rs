@@ -19,12 +19,11 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Most rows of a job. Queries bring what they are given into the order of bricks: the more at once, the less is read
-/// twice.
-const MOST: usize = 1 << 22;
-
 /// Rows that are read and then checked, while they are near.
 const CHECKED: usize = 1 << 10;
+
+/// Rows after which signals are asked for, a multiple of those.
+const BETWEEN: usize = 1 << 20;
 
 /// A scene that is open. Threads may share it: their jobs are done in turn.
 #[pyclass(frozen, module = "brickwalk._brickwalk")]
@@ -61,26 +60,25 @@ impl<'py, R: Send + 'static> Job<'py, '_, R> {
     ) -> PyResult<()> {
         let desk = self.core.desk()?;
         let (count, _) = self.rows.shape();
-        let parts = || (0..count).step_by(MOST).map(|start| start..count.min(start + MOST));
-        let read = |part: Range<usize>| -> PyResult<Vec<R>> {
-            py.check_signals()?;
-            let mut given = Vec::with_capacity(part.len());
-            for start in part.clone().step_by(CHECKED) {
-                (self.read)(&self.rows, start..part.end.min(start + CHECKED), &mut given)?;
-                let read = &given[start - part.start..];
-                (self.bad)(start, read, &self.named).map_or(Ok(()), |text| Err(wrong(text)))?;
-            }
-            Ok(given)
-        };
+        let part = |start: usize, most: usize| start..count.min(start + most);
         // Nothing is done before all is known to be good.
-        if count > MOST {
-            parts().try_for_each(|part| read(part).map(|_| ()))?;
+        let mut near = Vec::with_capacity(CHECKED);
+        for start in (0..count).step_by(CHECKED) {
+            near.clear();
+            (self.read)(&self.rows, part(start, CHECKED), &mut near)?;
+            (self.bad)(start, &near, &self.named).map_or(Ok(()), |text| Err(wrong(text)))?;
+            if start % BETWEEN == 0 {
+                py.check_signals()?;
+            }
         }
         let mut progress = Progress::new(self.progress, count as u64);
-        for part in parts() {
-            let (start, end, given) = (part.start, part.end, read(part)?);
+        let most = desk.run(py, &mut progress, |held, _| held.begin())?;
+        for start in (0..count).step_by(most) {
+            let (part, mut given) = (part(start, most), Vec::new());
+            given.reserve_exact(part.len());
+            (self.read)(&self.rows, part.clone(), &mut given)?;
             take(start, desk.run(py, &mut progress, move |held, task| work(held, &given, task))?)?;
-            progress.reached(end as u64)?;
+            progress.reached(part.end as u64)?;
         }
         Ok(())
     }

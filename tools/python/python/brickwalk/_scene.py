@@ -159,11 +159,10 @@ class Scene:
     def stats(self) -> dict[str, Any]:
         """What was done since the scene was opened.
 
-        ``queries``, calls of at most 4,194,304 rays or points each; ``rays`` whose closest hit was looked for,
-        ``occlusion_rays``, ``hits`` of both; ``query_payloads_read`` and ``query_bytes_read`` from the file,
-        ``query_most_bytes`` of those in memory at a time. ``pictures``; ``bricks_loaded``, ``bricks_evicted``,
-        ``bytes_loaded`` and ``round_trips`` of their device, ``device``, its name once it is open, else None.
-        ``seconds`` spent on all of it.
+        ``queries``; ``rays`` whose closest hit was looked for, ``occlusion_rays``, ``hits`` of both;
+        ``query_payloads_read`` and ``query_bytes_read`` from the file, ``query_most_bytes`` of those in memory at a
+        time. ``pictures``; ``bricks_loaded``, ``bricks_evicted``, ``bytes_loaded`` and ``round_trips`` of their device,
+        ``device``, its name once it is open, else None. ``seconds`` spent on all of it.
         """
         return self._check().stats()
 
