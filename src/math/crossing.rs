@@ -184,6 +184,56 @@ fn surely_meets(line: &Line, reach: f64, [a, b, c]: [DVec3; 3]) -> Option<bool> 
     (is_known && (least > error || greatest < -error)).then_some(true)
 }
 
+/// Eight lines whose references are 0, side by side.
+pub struct Lines {
+    /// By axes.
+    origin: [[f64; 8]; 3],
+    direction: [[f64; 8]; 3],
+    /// Greatest magnitudes of the origins' components.
+    reach: [f64; 8],
+    /// Sums of the magnitudes of the directions' components.
+    length: [f64; 8],
+}
+
+impl Lines {
+    /// `of` side by side.
+    #[inline(always)]
+    pub fn new(of: [&Line; 8]) -> Self {
+        let mut lines = Self { origin: [[0.0; 8]; 3], direction: [[0.0; 8]; 3], reach: [0.0; 8], length: [0.0; 8] };
+        for (i, line) in of.into_iter().enumerate() {
+            for k in 0..3 {
+                (lines.origin[k][i], lines.direction[k][i]) = (line.origin[k], line.direction[k]);
+            }
+            lines.reach[i] = DVec3::from_array(line.origin).abs().max_element();
+            lines.length[i] = DVec3::from_array(line.direction).abs().element_sum();
+        }
+        lines
+    }
+
+    /// Which lines certainly do not meet the triangle, a bit each: those that [`surely_meets`] denies.
+    #[inline(always)]
+    pub fn surely_miss(&self, [a, b, c]: [DVec3; 3]) -> u32 {
+        let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
+        let mut misses = [0; 8];
+        for i in 0..8 {
+            let [ox, oy, oz] = [self.origin[0][i], self.origin[1][i], self.origin[2][i]];
+            let [dx, dy, dz] = [self.direction[0][i], self.direction[1][i], self.direction[2][i]];
+            let (ax, ay, az) = (a.x - ox, a.y - oy, a.z - oz);
+            let (bx, by, bz) = (b.x - ox, b.y - oy, b.z - oz);
+            let (cx, cy, cz) = (c.x - ox, c.y - oy, c.z - oz);
+            let u = dx * (by * cz - bz * cy) + dy * (bz * cx - bx * cz) + dz * (bx * cy - by * cx);
+            let v = dx * (cy * az - cz * ay) + dy * (cz * ax - cx * az) + dz * (cx * ay - cy * ax);
+            let w = dx * (ay * bz - az * by) + dy * (az * bx - ax * bz) + dz * (ax * by - ay * bx);
+            let most = greatest + self.reach[i];
+            let error = TRIPLE_ERROR * 2.0 * most * most * self.length[i] + UNDERFLOW;
+            let is_above = (u > error) | (v > error) | (w > error);
+            let is_below = (u < -error) | (v < -error) | (w < -error);
+            misses[i] = u64::from(is_above & is_below);
+        }
+        (0..8).fold(0, |mask, i| mask | (misses[i] as u32) << i)
+    }
+}
+
 /// Where `line` meets the closed triangle, whatever t; `None` if it does not, or lies in its plane.
 pub fn crossing(line: &Line, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
     let [(a, ma), (b, mb), (c, mc)] = triangle.map(|vertex| relative(line, vertex));
@@ -236,7 +286,7 @@ mod tests {
     fn what_one_bound_decides_is_so() {
         let mut rng = crate::math::random::Rng(5);
         let mut point = |scale: f64| DVec3::from_array([0; 3].map(|_| scale * f64::from(rng.signed())));
-        let (mut decided, mut met) = ([0; 2], 0);
+        let (mut decided, mut met, mut last, mut missed) = ([0; 2], 0, Vec::new(), 0);
         for i in 0..30_000u32 {
             let [a, b, c] = [0; 3].map(|_| point(1.0));
             let from = point([3.0, 1e6, 1e12][i as usize / 3 % 3]);
@@ -252,11 +302,23 @@ mod tests {
                 assert_eq!(told, truth.is_some(), "{line:?}");
                 decided[usize::from(told)] += 1;
             }
+            last.push(line);
+            if let Ok(lines) = <[Line; 8]>::try_from(&*last) {
+                let misses = Lines::new(lines.each_ref()).surely_miss([a, b, c]);
+                for (k, line) in lines.iter().enumerate() {
+                    let reach = DVec3::from_array(line.origin).abs().max_element();
+                    let is_missed = surely_meets(line, reach, [a, b, c]) == Some(false);
+                    assert_eq!(misses >> k & 1 != 0, is_missed, "{line:?}");
+                    missed += u32::from(is_missed);
+                }
+                last.clear();
+            }
             let near = crossing_near(&line, reach, [a, b, c]);
             assert_eq!(near.map(|x| (x.t, x.weights)), truth.map(|x| (x.t, x.weights)));
             met += u32::from(truth.is_some());
         }
         assert!(met > 9000 && decided[0] > 5000 && decided[1] > 5000, "{met} {decided:?}");
+        assert!((5000..25_000).contains(&missed), "{missed}");
     }
 
     /// A direction of 2^-1060 of the length meets what the direction meets, also where products are rounded to

@@ -1,10 +1,11 @@
 //! How rays find what they may meet: boxes in f32, in frames in which these are small. Triangles are the caller's, in
 //! f64.
 //!
-//! A ray is rounded to f32 where it enters a brick, in the frame of the brick. Boxes of a node are grown by 64 units of
-//! their distance and by 4 of their coordinates, as in [`crate::kernels::trace::node`], of which the proof needs 8 of
-//! the one alone (docs/methods/exact.md): the rest is more than such a ray is off, as long as f64 knows places to 2^-20
-//! of a step of the lattice. Where it does not, boxes are asked in f64.
+//! A ray is rounded to f32 where it enters a brick, in the frame of the brick. All boxes of the brick are grown by 72
+//! units of the greatest distance that any may have from there, of which the proof needs 8 of each one's own
+//! (docs/methods/exact.md): the rest is more than such a ray is off, as long as f64 knows places to 2^-20 of a step of
+//! the lattice. Where it does not, boxes are asked in f64. One distance for all is as good, for units are small beside
+//! the grids of nodes, and it leaves little to be computed of a node before its boxes are.
 
 use super::room::Inner;
 use super::space::{Geometry, Placed, Slabs};
@@ -45,7 +46,7 @@ pub(super) struct Aim {
     start: f64,
     scaled: Scaled,
     /// Inverse of the direction's components.
-    inverse: [f32; 3],
+    pub(super) inverse: [f32; 3],
     /// The interval, in lengths of the given direction; closed.
     pub(super) t_min: f64,
     /// Its end.
@@ -60,13 +61,19 @@ fn inverse(direction: DVec3) -> [f32; 3] {
     [of(d.x), of(d.y), of(d.z)]
 }
 
+/// Units of distances by which boxes are grown.
+const GROWN: f32 = 72.0 * UNIT;
+
 /// A ray in a frame.
-struct Local {
-    origin: [f32; 3],
+pub(super) struct Local {
+    /// Its origin, moved by as much as boxes are grown: on, for their bounds that are near.
+    pub(super) ahead: [f32; 3],
+    /// And back, for the others.
+    pub(super) behind: [f32; 3],
     inverse: [f32; 3],
     /// Whether the direction is negative, so that upper bounds are near, by axis.
     is_negative: [bool; 3],
-    t_min: f32,
+    pub(super) t_min: f32,
     /// The frame's lengths of a length of the ray.
     factor: f64,
     /// How far along the ray the frame's begins.
@@ -76,12 +83,22 @@ struct Local {
 }
 
 impl Local {
+    /// `extent` is that of the frame's boxes.
     #[inline(always)]
-    fn new(origin: DVec3, inverse: [f32; 3], (factor, from, slack): (f64, f64, f64), near: f64) -> Self {
+    fn new(
+        (origin, extent): (DVec3, f32),
+        inverse: [f32; 3],
+        (factor, from, slack): (f64, f64, f64),
+        near: f64,
+    ) -> Self {
         let t_min = (near - from) * factor;
         let t_min = (t_min - t_min.abs() * ROUNDED - slack).max(0.0) as f32;
+        let origin = origin.as_vec3();
+        let grown = GROWN * (origin.abs().max_element() + extent);
+        let on = three!(k => grown.copysign(inverse[k]));
         Self {
-            origin: origin.as_vec3().to_array(),
+            ahead: three!(k => origin[k] + on[k]),
+            behind: three!(k => origin[k] - on[k]),
             is_negative: inverse.map(f32::is_sign_negative),
             inverse,
             t_min: t_min.min(T_INFINITE),
@@ -93,7 +110,7 @@ impl Local {
 
     /// No less than a distance along the ray.
     #[inline(always)]
-    fn above(&self, distance: f64) -> f32 {
+    pub(super) fn above(&self, distance: f64) -> f32 {
         let t = (distance - self.from) * self.factor;
         if t == f64::NEG_INFINITY {
             // Before everything.
@@ -107,19 +124,14 @@ impl Local {
 impl Asks for Local {
     #[inline(always)]
     fn ask<I: Isa>(&self, isa: I, node: &Node, limit: f32) -> (u32, [f32; 8]) {
-        let step = node.exponent.map(|e| f32::from_bits(u32::from(e) << 23));
-        let way = three!(k => node.origin[k] - self.origin[k]);
-        let far = three!(k => way[k].abs() + 255.0 * step[k]);
-        let all = 64.0 * UNIT * far[0].max(far[1]).max(far[2]);
         let (mut near, mut end) = (isa.eight(self.t_min), isa.eight(limit));
         for k in 0..3 {
-            let inverse = self.inverse[k];
-            let delta = (all + 4.0 * UNIT * node.origin[k].abs()).copysign(inverse);
-            let scale = isa.eight(step[k] * inverse);
+            let (step, inverse) = (f32::from_bits(u32::from(node.exponent[k]) << 23), self.inverse[k]);
+            let scale = isa.eight(step * inverse);
             let (first, last) =
                 if self.is_negative[k] { (&node.hi[k], &node.lo[k]) } else { (&node.lo[k], &node.hi[k]) };
-            near = near.most(isa.numbers(first) * scale + isa.eight((way[k] - delta) * inverse));
-            end = end.least(isa.numbers(last) * scale + isa.eight((way[k] + delta) * inverse));
+            near = near.most(isa.numbers(first) * scale + isa.eight((node.origin[k] - self.ahead[k]) * inverse));
+            end = end.least(isa.numbers(last) * scale + isa.eight((node.origin[k] - self.behind[k]) * inverse));
         }
         let mut nears = [0.0; 8];
         near.store(&mut nears);
@@ -156,7 +168,7 @@ impl Aim {
     /// No less than the distance along the ray of what is met at `t`, in lengths of the given direction. Of a ray from
     /// far away a distance that small is rounded by much.
     #[inline(always)]
-    fn limit(&self, t: f64) -> f64 {
+    pub(super) fn limit(&self, t: f64) -> f64 {
         if t == f64::NEG_INFINITY { t } else { self.along(t + t.abs() * MOVED) }
     }
 
@@ -182,21 +194,27 @@ impl Aim {
 
     /// The ray in a frame in world directions that has its origin at `origin`, from `from` on.
     #[inline(always)]
-    fn local(&self, origin: DVec3, per_unit: f64, (from, step): (f64, f64)) -> Local {
+    pub(super) fn local(&self, (origin, extent): (DVec3, f32), per_unit: f64, (from, step): (f64, f64)) -> Local {
         let at = ((self.near - origin) + self.scaled.direction * from) * per_unit;
-        Local::new(at, self.inverse, (per_unit, from, LEAST_STEP * step * per_unit), self.begin())
+        Local::new((at, extent), self.inverse, (per_unit, from, LEAST_STEP * step * per_unit), self.begin())
+    }
+
+    /// Whether f64 knows the ray well enough in the frame of a brick that lies as its object does.
+    #[inline(always)]
+    pub(super) fn is_known(&self, brick: &Placed, from: f64) -> bool {
+        let &Geometry { reach, step, .. } = brick.geometry;
+        MOVED * (self.near_reach + 2.0 * from + reach) <= LEAST_STEP * step
     }
 
     /// The ray in the frame of a brick; `None` where f64 does not know it well enough.
     #[inline(always)]
     fn in_brick(&self, brick: &Placed, from: f64) -> Option<Local> {
         let geometry = brick.geometry;
-        let &Geometry { origin, per_unit, step, .. } = geometry;
-        let reach = self.near_reach + 2.0 * from;
+        let &Geometry { origin, per_unit, step, extent, .. } = geometry;
         let Some(matrix) = brick.matrix else {
-            let is_known = MOVED * (reach + geometry.reach) <= LEAST_STEP * step;
-            return is_known.then(|| self.local(origin, per_unit, (from, step)));
+            return self.is_known(brick, from).then(|| self.local((origin, extent), per_unit, (from, step)));
         };
+        let reach = self.near_reach + 2.0 * from;
         let world = affine(matrix);
         let object = world.inverse();
         let norm = |m: &DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
@@ -212,7 +230,7 @@ impl Aim {
         let at = object.transform_point3(self.near + self.scaled.direction * from) - origin;
         let factor = direction.scaled(1.0) * per_unit;
         let slack = LEAST_STEP * step * per_unit;
-        Some(Local::new(at * per_unit, inverse(direction.direction), (factor, from, slack), self.begin()))
+        Some(Local::new((at * per_unit, extent), inverse(direction.direction), (factor, from, slack), self.begin()))
     }
 
     /// Calls `visit` for the leaves of the top level that the ray may enter, about as it does, with where at the
@@ -226,7 +244,7 @@ impl Aim {
         mut visit: impl FnMut(u32, f64) -> f64,
     ) {
         let unit = top.frame.unit;
-        let local = self.local(top.frame.origin, top.per_unit, (0.0, top.step));
+        let local = self.local((top.frame.origin, top.extent), top.per_unit, (0.0, top.step));
         let limit = local.above(self.limit(self.t_max));
         walk(
             isa,

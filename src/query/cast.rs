@@ -2,6 +2,7 @@
 
 use super::aim::Aim;
 use super::hits::normal;
+use super::packet::{MANY, Packet};
 use super::room::{Inner, Room};
 use super::rounds::{Bricks, Seek, State};
 use super::space::Placed;
@@ -13,6 +14,7 @@ use crate::math::crossing::Crossing;
 use crate::math::sampling::pcg;
 use crate::output::npy::{Hit, Ray};
 use anyhow::Result;
+use glam::DVec3;
 use rayon::prelude::*;
 
 /// Rays that look for what they meet.
@@ -55,10 +57,9 @@ impl Seek for Casting<'_> {
     fn go<I: Isa>(&self, isa: I, ray: &Ray, found: &mut Found, bricks: &Bricks, room: &mut Room) -> Option<u32> {
         let (top, resident) = (self.queries.top(), self.queries.scene.resident());
         let aim = Aim::new(top, ray)?;
-        let is_met = |found: &Found| self.any && found.id != NONE;
         // The nearest brick that is away, and where it is entered.
         let mut next = (f64::INFINITY, NONE);
-        let Room { top: open, inner } = room;
+        let Room { top: open, inner, .. } = room;
         aim.leaves(
             isa,
             top,
@@ -74,15 +75,111 @@ impl Seek for Casting<'_> {
                     State::Away if from < next.0 => next = (from, number),
                     _ => (),
                 }
-                if is_met(found) { f64::NEG_INFINITY } else { found.t.min(aim.t_max) }
+                self.end(&aim, found)
             },
         );
-        let matters = next.1 != NONE && !is_met(found) && aim.may_enter(next.0, found.t.min(aim.t_max));
+        let matters = next.1 != NONE && aim.may_enter(next.0, self.end(&aim, found));
         matters.then_some(next.1)
+    }
+
+    #[inline(always)]
+    fn go_together<I: Isa>(
+        &self,
+        isa: I,
+        rays: &[Ray; MANY],
+        mut found: [&mut Found; MANY],
+        bricks: &Bricks,
+        room: &mut Room,
+    ) -> u32 {
+        let (top, resident) = (self.queries.top(), self.queries.scene.resident());
+        let Some(packet) = Packet::new(top, rays) else { return u32::MAX };
+        let (mut alone, t) = (0, self.ends(&packet, &found));
+        let Room { joint, inner, .. } = room;
+        packet.leaves(
+            isa,
+            top,
+            joint,
+            t,
+            #[inline(always)]
+            |leaf, from, who| {
+                match bricks.get(resident.leaves[leaf as usize].brick) {
+                    State::AtHand(geometry) => {
+                        let brick = Placed::new(resident, leaf, geometry);
+                        let t = self.ends(&packet, &found);
+                        let went = packet.triangles(
+                            isa,
+                            &brick,
+                            (from, who),
+                            &mut inner.joint,
+                            t,
+                            #[inline(always)]
+                            |triangle, vertices, i| {
+                                let (aim, found) = (&packet.aims[i], &mut *found[i]);
+                                // Who needs no more has nothing before its end.
+                                if !self.is_met(found) {
+                                    self.meet((&rays[i], aim), (leaf, &brick), (triangle, vertices), found);
+                                }
+                                self.end(aim, found)
+                            },
+                        );
+                        let mut left = if went { 0 } else { who };
+                        while left != 0 {
+                            let i = left.trailing_zeros() as usize;
+                            left &= left - 1;
+                            self.go_through(isa, (&rays[i], &packet.aims[i]), (leaf, &brick), from, found[i], inner);
+                        }
+                    }
+                    State::Away => alone |= who,
+                    State::Done => (),
+                }
+                self.ends(&packet, &found)
+            },
+        );
+        alone
     }
 }
 
 impl Casting<'_> {
+    /// Whether a ray needs no more.
+    #[inline(always)]
+    fn is_met(&self, found: &Found) -> bool {
+        self.any && found.id != NONE
+    }
+
+    /// Up to where a ray may still meet what matters.
+    #[inline(always)]
+    fn end(&self, aim: &Aim, found: &Found) -> f64 {
+        if self.is_met(found) { f64::NEG_INFINITY } else { found.t.min(aim.t_max) }
+    }
+
+    /// The same of rays that go together.
+    #[inline(always)]
+    fn ends(&self, packet: &Packet, found: &[&mut Found; MANY]) -> [f64; MANY] {
+        let mut ends = [0.0; MANY];
+        for i in 0..MANY {
+            ends[i] = self.end(&packet.aims[i], found[i]);
+        }
+        ends
+    }
+
+    /// Has a ray meet a triangle.
+    #[inline(always)]
+    fn meet(
+        &self,
+        (ray, aim): (&Ray, &Aim),
+        (leaf, brick): (u32, &Placed),
+        (triangle, vertices): (u32, [DVec3; 3]),
+        found: &mut Found,
+    ) {
+        if let Some(Crossing { t, weights, .. }) = aim.meet(vertices) {
+            let (id, weights) = (brick.id(triangle), weights.map(|weight| weight as f32));
+            // Of what is as near, the lowest id.
+            if (t, id) < (found.t, found.id) && !self.passes(ray, brick, triangle, id, weights) {
+                *found = Found { t, id, leaf, triangle, weights, normal: normal(vertices) };
+            }
+        }
+    }
+
     /// Has a ray meet what there is in a brick.
     #[inline(always)]
     fn go_through<I: Isa>(
@@ -102,18 +199,8 @@ impl Casting<'_> {
             room,
             #[inline(always)]
             |triangle| {
-                let vertices = brick.vertices(triangle);
-                if let Some(Crossing { t, weights, .. }) = aim.meet(vertices) {
-                    let (id, weights) = (brick.id(triangle), weights.map(|weight| weight as f32));
-                    // Of what is as near, the lowest id.
-                    if (t, id) < (found.t, found.id) && !self.passes(ray, brick, triangle, id, weights) {
-                        *found = Found { t, id, leaf, triangle, weights, normal: normal(vertices) };
-                        if self.any {
-                            return None;
-                        }
-                    }
-                }
-                Some(found.t.min(aim.t_max))
+                self.meet((ray, aim), (leaf, brick), (triangle, brick.vertices(triangle)), found);
+                (!self.is_met(found)).then_some(found.t.min(aim.t_max))
             },
         );
     }

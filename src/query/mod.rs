@@ -21,6 +21,7 @@ mod hits;
 mod inside;
 mod near;
 mod nearest;
+mod packet;
 mod rays;
 mod room;
 mod rounds;

@@ -17,23 +17,22 @@ const FAR: f32 = 1e18;
 /// A point in a frame.
 pub(super) struct Near {
     at: [f32; 3],
-    /// The greatest magnitude of its components.
-    reach: f32,
-    /// By how much boxes are grown for what is rounded in the world.
+    /// By how much boxes are grown.
     pad: f32,
     /// The frame's units of a world unit.
     per_unit: f64,
 }
 
 impl Near {
-    /// `point` in the frame whose origin lies at `origin`; `far` is the greatest coordinate of what lies there, world
-    /// units. `None`: it is too far away.
+    /// `point` in the frame whose origin lies at `origin`; `extent` is that of its boxes, and `far` the greatest
+    /// coordinate of what lies there, world units. `None`: it is too far away.
     #[inline(always)]
-    pub(super) fn new(point: DVec3, origin: DVec3, per_unit: f64, far: f64) -> Option<Self> {
+    pub(super) fn new(point: DVec3, origin: DVec3, per_unit: f64, (extent, far): (f32, f64)) -> Option<Self> {
         let at = ((point - origin) * per_unit).as_vec3();
         let reach = at.abs().max_element();
         let pad = (MARGIN * far.max(point.abs().max_element()) * per_unit) as f32;
-        (reach.max(pad) < FAR).then(|| Self { at: at.to_array(), reach, pad, per_unit })
+        let pad = pad + 64.0 * UNIT * (reach + extent);
+        (reach.max(pad) < FAR).then(|| Self { at: at.to_array(), pad, per_unit })
     }
 
     /// No less than a squared distance in the world.
@@ -54,14 +53,10 @@ impl Near {
 impl Asks for Near {
     #[inline(always)]
     fn ask<I: Isa>(&self, isa: I, node: &Node, limit: f32) -> (u32, [f32; 8]) {
-        let step = node.exponent.map(|e| f32::from_bits(u32::from(e) << 23));
-        let [x, y, z] = node.origin.map(f32::abs);
-        let far = (x + 255.0 * step[0]).max(y + 255.0 * step[1]).max(z + 255.0 * step[2]);
-        let pad = self.pad + 64.0 * UNIT * (self.reach + far);
-        let zero = isa.eight(0.0);
+        let (pad, zero) = (self.pad, isa.eight(0.0));
         let mut sum = zero;
         for k in 0..3 {
-            let step = isa.eight(step[k]);
+            let step = isa.eight(f32::from_bits(u32::from(node.exponent[k]) << 23));
             let way = node.origin[k] - self.at[k];
             let below = isa.numbers(&node.lo[k]) * step + isa.eight(way - pad);
             let above = isa.eight(-way - pad) - isa.numbers(&node.hi[k]) * step;
@@ -77,6 +72,7 @@ impl Asks for Near {
 
 #[cfg(test)]
 mod tests {
+    use super::super::walk::extent;
     use super::*;
     use crate::kernels::simd::isa::for_each_isa;
     use crate::math::random::Rng;
@@ -113,7 +109,7 @@ mod tests {
                 let origin = place([0.0, 1e3, 1e9][i / 3 % 3]);
                 let point = origin + place([1.0, 300.0, 1e4, 1e9][i / 9 % 4]);
                 let far = origin.abs().max_element() + 2000.0 * unit;
-                let near = Near::new(point, origin, 1.0 / unit, far).unwrap();
+                let near = Near::new(point, origin, 1.0 / unit, (extent(&[node]), far)).unwrap();
                 let true_ones: [f64; 8] = std::array::from_fn(|slot| squared(&node, slot, (origin, unit), point));
                 let within = true_ones[i % 8];
                 let (mask, told) = near.ask(isa, &node, near.limit(within));
@@ -126,6 +122,6 @@ mod tests {
             }
             assert!(asked > 12_000 && left_out > 8000, "{asked} {left_out}");
         });
-        assert!(Near::new(DVec3::X * 1e19, DVec3::ZERO, 1.0, 1.0).is_none());
+        assert!(Near::new(DVec3::X * 1e19, DVec3::ZERO, 1.0, (1.0, 1.0)).is_none());
     }
 }

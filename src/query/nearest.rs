@@ -126,7 +126,7 @@ impl Seek for Nearest<'_> {
     #[inline(always)]
     fn go<I: Isa>(&self, isa: I, point: &[f64; 3], best: &mut Best, bricks: &Bricks, room: &mut Room) -> Option<u32> {
         let (resident, point) = (self.0.scene.resident(), DVec3::from_array(*point));
-        let Room { top, inner } = room;
+        let Room { top, inner, .. } = room;
         // The nearest brick that is away, and how near it is at least.
         let mut next = (f64::INFINITY, NONE);
         self.0.top().near_leaves(

@@ -1,5 +1,6 @@
 //! Room for walks: what is left to be visited.
 
+use super::packet::Joint;
 use super::walk::Open;
 
 /// Room for walks.
@@ -7,6 +8,8 @@ use super::walk::Open;
 pub(super) struct Room {
     /// Of the top level.
     pub(super) top: Vec<Open>,
+    /// Of the top level, of rays together.
+    pub(super) joint: Vec<Joint>,
     /// What walks through bricks take.
     pub(super) inner: Inner,
 }
@@ -16,6 +19,8 @@ pub(super) struct Room {
 pub(super) struct Inner {
     /// In the frame of a brick.
     pub(super) open: Vec<Open>,
+    /// Of rays together.
+    pub(super) joint: Vec<Joint>,
     /// In f64, by squared distances.
     pub(super) near: Vec<(f64, Child)>,
     /// In f64, numbers of nodes.

@@ -5,6 +5,7 @@
 //! many as the cache holds. What has been at hand once is not asked for again. So of a batch each brick is read at most
 //! once, and none that no item needs.
 
+use super::packet::MANY;
 use super::room::Room;
 use super::space::Geometry;
 use super::{Queries, Watch};
@@ -40,6 +41,20 @@ pub(super) trait Seek: Sync {
         bricks: &Bricks,
         room: &mut Room,
     ) -> Option<u32>;
+
+    /// The same for items side by side, where they go faster together and nothing on their way is away. Returns which
+    /// are to go alone after all, a bit each. Implementations are always inlined.
+    #[inline(always)]
+    fn go_together<I: Isa>(
+        &self,
+        _isa: I,
+        _items: &[Self::Item; MANY],
+        _found: [&mut Self::Found; MANY],
+        _bricks: &Bricks,
+        _room: &mut Room,
+    ) -> u32 {
+        u32::MAX
+    }
 }
 
 /// A brick, in a round.
@@ -88,6 +103,19 @@ impl<S: Seek> Work for Task<'_, '_, S> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let (mut room, mut done) = (Room::default(), 0);
+        let (packets, _) = self.items.as_chunks();
+        let (places, _) = self.sought.as_chunks_mut();
+        for (items, sought) in packets.iter().zip(places).filter(|(_, all)| all.iter().all(|one| !one.is_done)) {
+            let found = sought.each_mut().map(
+                #[inline(always)]
+                |one| &mut one.found,
+            );
+            let alone = self.seek.go_together(isa, items, found, self.bricks, &mut room);
+            for (i, one) in sought.iter_mut().enumerate() {
+                one.is_done = alone >> i & 1 == 0;
+                done += u64::from(one.is_done);
+            }
+        }
         for (item, sought) in self.items.iter().zip(self.sought).filter(|(_, sought)| !sought.is_done) {
             match self.seek.go(isa, item, &mut sought.found, self.bricks, &mut room) {
                 Some(brick) => {

@@ -5,7 +5,7 @@
 
 use super::near::{MARGIN, Near};
 use super::room::{Child, Inner};
-use super::walk::walk;
+use super::walk::{extent, walk};
 use crate::kernels::payloads::BrickView;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::trace::node::inner_before;
@@ -126,6 +126,8 @@ pub(super) struct Geometry<'a> {
     pub(super) reach: f64,
     /// Its greatest coordinates, in its object's units.
     far: DVec3,
+    /// The greatest of its boxes, in device units.
+    pub(super) extent: f32,
 }
 
 impl<'a> Geometry<'a> {
@@ -136,8 +138,10 @@ impl<'a> Geometry<'a> {
         let [step, unit] = [object.step_log2, object.unit_log2].map(|log2| f64::from(log2).exp2());
         let far = |k: usize| (brick.min[k].unsigned_abs().max(brick.max[k].unsigned_abs())) as f64 * step;
         let origin = DVec3::from_array(brick.origin.map(|x| x as f64)) * step;
+        let view = BrickView::new(brick, bytes, opacity);
         Self {
-            view: BrickView::new(brick, bytes, opacity),
+            extent: extent(view.nodes),
+            view,
             origin,
             unit,
             per_unit: 1.0 / unit,
@@ -272,7 +276,10 @@ impl<'a> Placed<'a> {
         mut visit: impl FnMut(u32) -> f64,
     ) {
         let far = self.geometry.far.max_element();
-        let near = self.matrix.is_none().then(|| Near::new(point, self.geometry.origin, self.geometry.per_unit, far));
+        let near = self
+            .matrix
+            .is_none()
+            .then(|| Near::new(point, self.geometry.origin, self.geometry.per_unit, (self.geometry.extent, far)));
         let Some(near) = near.flatten() else { return self.walk_near_wide(point, within, &mut room.near, visit) };
         let mut limit = near.limit(within);
         walk(

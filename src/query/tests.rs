@@ -1,5 +1,6 @@
 //! Queries against brute force over the triangles as truth decodes them, and against closed forms.
 
+use super::packet::Packet;
 use super::*;
 use crate::kernels::layout::NONE;
 use crate::math::crossing::crossing;
@@ -115,6 +116,23 @@ fn rays(count: usize) -> Vec<Ray> {
     rays
 }
 
+/// Rays by eight that are much the same, or not so much.
+fn bundles(count: usize) -> Vec<Ray> {
+    let mut rng = Rng(11);
+    let mut bundles = Vec::new();
+    for (i, ray) in rays(count).iter().enumerate() {
+        let spread = [0.0, 1e-6, 1e-3, 0.02][i % 4];
+        bundles.extend((0..packet::MANY).map(|_| {
+            let [origin, direction] = [ray.origin, ray.direction].map(|of| {
+                let off = spread * in_ball(&mut rng);
+                (DVec3::from_array(of) + off).to_array()
+            });
+            Ray { origin, direction, ..*ray }
+        }));
+    }
+    bundles
+}
+
 fn brute(truth: &Truth, ray: &Ray) -> Vec<(f64, u32)> {
     let line = TruthRay::new(ray.origin, ray.direction, 0.0, 0.0).line();
     let met = |id| Some((crossing(&line, truth.vertices(id)?)?.t, id));
@@ -166,13 +184,15 @@ fn met(hit: &Hit) -> Option<(f64, u32)> {
 
 #[test]
 fn the_closest_hit_is_what_brute_force_finds() {
-    let mut rays = rays(900);
+    let bundles = bundles(120);
+    let mut rays = [bundles.clone(), rays(900)].concat();
     // From far away, where f64 knows less of them than a step of the lattice.
     let from_afar = |ray: &Ray| {
         let origin = [0, 1, 2].map(|k| ray.origin[k] - 1e9 * ray.direction[k]);
         Ray { origin, t_min: 0.0, t_max: f64::INFINITY, ..*ray }
     };
-    rays.extend(rays[..60].to_vec().iter().map(from_afar));
+    let afar: Vec<Ray> = rays.iter().skip(bundles.len() / 2).take(60 + bundles.len() / 2).map(from_afar).collect();
+    rays.extend(afar);
     let mut expected: Vec<Option<(f64, u32)>> = Vec::new();
     let mut all = Vec::new();
     for (brick_triangles, cache, threads) in [(1 << 14, 64 << 20, 1), (128, 64 << 20, 2), (128, 0, 2), (64, 0, 1)] {
@@ -184,6 +204,8 @@ fn the_closest_hit_is_what_brute_force_finds() {
         let queries = Queries::new(file, CacheSize::Bytes(cache), threads).unwrap();
         let hits = queries.cast(&rays, &mut |_| Ok(())).unwrap();
         let any = queries.any(&rays, &mut |_| Ok(())).unwrap();
+        let together = rays.as_chunks().0.iter().filter(|rays| Packet::new(queries.top(), rays).is_some()).count();
+        assert!(together > bundles.len() / packet::MANY * 3 / 5, "{together} went together");
         let mut told = 0;
         for (number, ray) in rays.iter().enumerate() {
             let own = met(&hits[number]);

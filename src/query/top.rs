@@ -2,7 +2,7 @@
 
 use super::near::Near;
 use super::space::{Boxes, Meets, children};
-use super::walk::{Open, walk};
+use super::walk::{Open, extent, walk};
 use crate::kernels::frame::{Frame, Placement};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::trace::node::inner_before;
@@ -24,6 +24,8 @@ pub(super) struct Top {
     pub(super) per_unit: f64,
     /// World units of a step of the lattice.
     pub(super) step: f64,
+    /// The greatest coordinate of boxes in the frame.
+    pub(super) extent: f32,
     /// The greatest coordinate of anything in the scene.
     far: f64,
 }
@@ -61,8 +63,10 @@ impl Top {
             };
             Boxes::new(grid(&node.lo), grid(&node.hi))
         };
+        let nodes = Placement::new(resident, &frame).top8;
         Self {
-            nodes: Placement::new(resident, &frame).top8,
+            extent: extent(&nodes),
+            nodes,
             boxes: resident.top8.iter().map(boxes).collect(),
             per_unit: 1.0 / frame.unit,
             frame,
@@ -120,7 +124,7 @@ impl Top {
         open: &mut Vec<Open>,
         mut visit: impl FnMut(u32, f64) -> f64,
     ) {
-        let Some(near) = Near::new(point, self.frame.origin, self.per_unit, self.far) else {
+        let Some(near) = Near::new(point, self.frame.origin, self.per_unit, (self.extent, self.far)) else {
             return self.leaves_from_afar(point, within, visit);
         };
         walk(

@@ -17,15 +17,52 @@ pub(super) struct Open(u64);
 
 impl Open {
     #[inline(always)]
-    fn new(near: f32, number: u32) -> Self {
+    pub(super) fn new(near: f32, number: u32) -> Self {
         // The sum makes a zero of either sign positive.
         Self(u64::from((near + 0.0).to_bits()) << 32 | u64::from(number))
     }
 
     #[inline(always)]
-    fn near(self) -> f32 {
+    pub(super) fn near(self) -> f32 {
         f32::from_bits((self.0 >> 32) as u32)
     }
+
+    #[inline(always)]
+    pub(super) fn number(self) -> u32 {
+        self.0 as u32
+    }
+}
+
+/// The elements of what is a leaf.
+#[inline(always)]
+pub(super) fn elements(open: Open) -> Option<Range<u32>> {
+    let number = open.number();
+    let first = (number & !LEAF) >> 2;
+    (number & LEAF != 0).then_some(first..first + (number & 3) + 1)
+}
+
+/// The number of what a node has in a slot, if there is something.
+#[inline(always)]
+pub(super) fn child(node: &Node, slot: u32) -> Option<u32> {
+    let what = u32::from(node.meta[slot as usize]);
+    if u32::from(node.inner_mask) >> slot & 1 != 0 {
+        Some(node.child_base + inner_before(u32::from(node.inner_mask), slot))
+    } else if what != 0 {
+        Some(LEAF | (node.triangle_base + (what & 31)) << 2 | ((what >> 5).count_ones() - 1))
+    } else {
+        None
+    }
+}
+
+/// No less than the magnitude of any coordinate of a tree's boxes: its root's grid, and a step beside it, holds all.
+pub(super) fn extent(nodes: &[Node]) -> f32 {
+    nodes.first().map_or(0.0, |root| {
+        let of = |k: usize| {
+            let step = f32::from_bits(u32::from(root.exponent[k]) << 23);
+            (root.origin[k] - step).abs().max((root.origin[k] + 256.0 * step).abs())
+        };
+        of(0).max(of(1)).max(of(2))
+    })
 }
 
 /// What asks the boxes of a node's children.
@@ -61,28 +98,19 @@ pub(super) fn walk<I: Isa>(
         if next.near() > limit {
             continue;
         }
-        let number = next.0 as u32;
-        if number & LEAF != 0 {
-            let first = (number & !LEAF) >> 2;
-            match visit(first..first + (number & 3) + 1, next.near()) {
+        if let Some(all) = elements(next) {
+            match visit(all, next.near()) {
                 Some(now) => limit = now,
                 None => return,
             }
             continue;
         }
-        let node = &nodes[number as usize];
+        let node = &nodes[next.number() as usize];
         let (mut left, near) = asks.ask(isa, node, limit);
         while left != 0 {
             let slot = left.trailing_zeros();
             left &= left - 1;
-            let what = u32::from(node.meta[slot as usize]);
-            let number = if u32::from(node.inner_mask) >> slot & 1 != 0 {
-                node.child_base + inner_before(u32::from(node.inner_mask), slot)
-            } else if what != 0 {
-                LEAF | (node.triangle_base + (what & 31)) << 2 | ((what >> 5).count_ones() - 1)
-            } else {
-                continue;
-            };
+            let Some(number) = child(node, slot) else { continue };
             let own = Open::new(near[slot as usize], number);
             nearest = Some(nearest.map_or(own, |before| {
                 open.push(before.max(own));

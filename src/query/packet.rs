@@ -1,0 +1,313 @@
+//! Rays that go much the same way, eight at a time: all of them ask a box at once, and a triangle whether they miss it.
+//! What they meet is decided ray by ray, as it is of one alone.
+//!
+//! Such rays enter much the same boxes. A box in eight lanes costs about as much as one node by a ray alone, but what a
+//! walk waits for most, memory and branches that turn out otherwise, is there once for eight.
+
+use super::aim::{Aim, Local};
+use super::space::{Geometry, Placed};
+use super::top::Top;
+use super::walk::{Open, child, elements};
+use crate::kernels::simd::isa::Isa;
+use crate::kernels::simd::wide::Wide;
+use crate::math::crossing::Lines;
+use crate::output::npy::Ray;
+use bricks::Node;
+use glam::DVec3;
+use std::ops::Range;
+
+/// Rays that go together.
+pub(super) const MANY: usize = 8;
+
+/// By how much the components of their directions differ at most, of the greatest.
+const TURNED: f64 = 1.0 / 32.0;
+
+/// How far apart they begin at most, of the scene's extent.
+const APART: f64 = 1.0 / 64.0;
+
+/// So many rays at least go through a brick together.
+const LEAST: u32 = 3;
+
+/// The expression for every ray. No closure, as of [`three`](crate::kernels::simd::wide::three).
+macro_rules! eight {
+    ($i:ident => $x:expr) => {
+        [
+            {
+                let $i = 0usize;
+                $x
+            },
+            {
+                let $i = 1usize;
+                $x
+            },
+            {
+                let $i = 2usize;
+                $x
+            },
+            {
+                let $i = 3usize;
+                $x
+            },
+            {
+                let $i = 4usize;
+                $x
+            },
+            {
+                let $i = 5usize;
+                $x
+            },
+            {
+                let $i = 6usize;
+                $x
+            },
+            {
+                let $i = 7usize;
+                $x
+            },
+        ]
+    };
+}
+
+/// What is left to be visited, and the rays to whom it may matter, a bit each.
+pub(super) type Joint = (Open, u32);
+
+/// Rays on their way together.
+pub(super) struct Packet {
+    pub(super) aims: [Aim; MANY],
+    lines: Lines,
+    /// Inverses of directions, by axes; of the same signs.
+    inverse: [[f32; MANY]; 3],
+    is_negative: [bool; 3],
+}
+
+/// The rays in a frame, as [`Local`].
+struct Locals {
+    ahead: [[f32; MANY]; 3],
+    behind: [[f32; MANY]; 3],
+    t_min: [f32; MANY],
+    /// Of one of them: distances are told alike for all.
+    one: Local,
+}
+
+impl Locals {
+    #[inline(always)]
+    fn new(of: [Local; MANY]) -> Self {
+        let (mut ahead, mut behind) = ([[0.0; MANY]; 3], [[0.0; MANY]; 3]);
+        for k in 0..3 {
+            for i in 0..MANY {
+                (ahead[k][i], behind[k][i]) = (of[i].ahead[k], of[i].behind[k]);
+            }
+        }
+        let t_min = eight!(i => of[i].t_min);
+        let [one, ..] = of;
+        Self { ahead, behind, t_min, one }
+    }
+}
+
+impl Packet {
+    /// `None`: the rays do not go much the same way, or not all of them come near the scene.
+    #[inline(always)]
+    pub(super) fn new(top: &Top, rays: &[Ray; MANY]) -> Option<Self> {
+        let first = &rays[0];
+        let [origin, direction] = [first.origin, first.direction].map(DVec3::from_array);
+        let turned = TURNED * direction.abs().max_element();
+        let apart = APART * f64::from(top.extent) * top.frame.unit;
+        let is_alike = |ray: &Ray| {
+            let [own, way] = [ray.origin, ray.direction].map(DVec3::from_array);
+            (way - direction).abs().max_element() <= turned && (own - origin).abs().max_element() <= apart
+        };
+        if !rays[1..].iter().all(is_alike) {
+            return None;
+        }
+        let aims = eight!(i => Aim::new(top, &rays[i])?);
+        let is_negative = aims[0].inverse.map(f32::is_sign_negative);
+        let mut inverse = [[0.0; MANY]; 3];
+        for k in 0..3 {
+            for i in 0..MANY {
+                inverse[k][i] = aims[i].inverse[k];
+                if inverse[k][i].is_sign_negative() != is_negative[k] {
+                    return None;
+                }
+            }
+        }
+        let lines = Lines::new(eight!(i => &aims[i].line));
+        Some(Self { lines, inverse, is_negative, aims })
+    }
+
+    /// No less than distances along the rays of what is met at `t`, in a frame.
+    #[inline(always)]
+    fn limits(&self, locals: &Locals, t: &[f64; MANY]) -> [f32; MANY] {
+        eight!(i => locals.one.above(self.aims[i].limit(t[i])))
+    }
+
+    /// Calls `visit` for the leaves of the top level that rays may enter up to `t`, with where at the earliest and which
+    /// rays; and up to what it returns. As [`Aim::leaves`].
+    #[inline(always)]
+    pub(super) fn leaves<I: Isa>(
+        &self,
+        isa: I,
+        top: &Top,
+        open: &mut Vec<Joint>,
+        t: [f64; MANY],
+        mut visit: impl FnMut(u32, f64, u32) -> [f64; MANY],
+    ) {
+        let unit = top.frame.unit;
+        let locals =
+            Locals::new(eight!(i => self.aims[i].local((top.frame.origin, top.extent), top.per_unit, (0.0, top.step))));
+        let limits = self.limits(&locals, &t);
+        self.walk(
+            isa,
+            (&top.nodes, &locals),
+            (1 << MANY) - 1,
+            limits,
+            open,
+            #[inline(always)]
+            |leaf, near, who| self.limits(&locals, &visit(leaf.start, f64::from(near) * unit, who)),
+        );
+    }
+
+    /// Calls `visit` for triangles of a brick, their vertices, and the rays of `who` that may meet them up to `t`, and
+    /// to what `visit` returns. As [`Aim::triangles`]. False: nothing was done, for the rays are to go alone.
+    #[inline(always)]
+    pub(super) fn triangles<I: Isa>(
+        &self,
+        isa: I,
+        brick: &Placed,
+        (from, who): (f64, u32),
+        open: &mut Vec<Joint>,
+        mut t: [f64; MANY],
+        mut visit: impl FnMut(u32, [DVec3; 3], usize) -> f64,
+    ) -> bool {
+        let is_known = self.aims.iter().all(
+            #[inline(always)]
+            |aim| aim.is_known(brick, from),
+        );
+        if who.count_ones() < LEAST || brick.matrix.is_some() || !is_known {
+            return false;
+        }
+        let &Geometry { origin, per_unit, step, extent, .. } = brick.geometry;
+        let locals = Locals::new(eight!(i => self.aims[i].local((origin, extent), per_unit, (from, step))));
+        let mut limits = self.limits(&locals, &t);
+        self.walk(
+            isa,
+            (brick.geometry.view.nodes, &locals),
+            who,
+            limits,
+            open,
+            #[inline(always)]
+            |triangles, _, who| {
+                for triangle in triangles {
+                    let vertices = brick.vertices(triangle);
+                    let mut left = who & !self.lines.surely_miss(vertices);
+                    while left != 0 {
+                        let ray = left.trailing_zeros() as usize;
+                        left &= left - 1;
+                        let now = visit(triangle, vertices, ray);
+                        if now != t[ray] {
+                            t[ray] = now;
+                            limits[ray] = locals.one.above(self.aims[ray].limit(now));
+                        }
+                    }
+                }
+                limits
+            },
+        );
+        true
+    }
+
+    /// As [`super::walk::walk`], for the rays of `who`: `visit` is told which of them may meet a leaf, and returns the
+    /// limits of all.
+    #[inline(always)]
+    fn walk<I: Isa>(
+        &self,
+        isa: I,
+        (nodes, locals): (&[Node], &Locals),
+        who: u32,
+        mut limits: [f32; MANY],
+        open: &mut Vec<Joint>,
+        mut visit: impl FnMut(Range<u32>, f32, u32) -> [f32; MANY],
+    ) {
+        open.clear();
+        let mut nearest = (!nodes.is_empty()).then_some((Open::new(0.0, 0), who));
+        let mut limit = greatest(&limits);
+        while let Some((next, who)) = nearest.take().or_else(
+            #[inline(always)]
+            || open.pop(),
+        ) {
+            if next.near() > limit {
+                continue;
+            }
+            if let Some(all) = elements(next) {
+                limits = visit(all, next.near(), who);
+                limit = greatest(&limits);
+                continue;
+            }
+            let node = &nodes[next.number() as usize];
+            let (mut left, near, by) = self.ask(isa, locals, node, (&limits, who));
+            while left != 0 {
+                let slot = left.trailing_zeros();
+                left &= left - 1;
+                let Some(number) = child(node, slot) else { continue };
+                let own = (Open::new(least(&near[slot as usize]), number), by[slot as usize]);
+                nearest = Some(nearest.map_or(
+                    own,
+                    #[inline(always)]
+                    |before| {
+                        open.push(before.max(own));
+                        before.min(own)
+                    },
+                ));
+            }
+        }
+    }
+
+    /// Which children of a node rays of `who` may enter up to their limits, a bit each; how near each is to each ray at
+    /// least, and to whom it may matter.
+    #[inline(always)]
+    fn ask<I: Isa>(
+        &self,
+        isa: I,
+        locals: &Locals,
+        node: &Node,
+        (limits, who): (&[f32; MANY], u32),
+    ) -> (u32, [[f32; MANY]; 8], [u32; 8]) {
+        let (mut nears, mut ends) = ([isa.load_eight(&locals.t_min); 8], [isa.load_eight(limits); 8]);
+        for k in 0..3 {
+            let inverse = isa.load_eight(&self.inverse[k]);
+            let (scale, origin) =
+                (isa.eight(f32::from_bits(u32::from(node.exponent[k]) << 23)) * inverse, isa.eight(node.origin[k]));
+            let ahead = (origin - isa.load_eight(&locals.ahead[k])) * inverse;
+            let behind = (origin - isa.load_eight(&locals.behind[k])) * inverse;
+            let (first, last) =
+                if self.is_negative[k] { (&node.hi[k], &node.lo[k]) } else { (&node.lo[k], &node.hi[k]) };
+            let (mut begins, mut stops) = ([0.0; 8], [0.0; 8]);
+            isa.numbers(first).store(&mut begins);
+            isa.numbers(last).store(&mut stops);
+            for slot in 0..8 {
+                nears[slot] = nears[slot].most(isa.eight(begins[slot]) * scale + ahead);
+                ends[slot] = ends[slot].least(isa.eight(stops[slot]) * scale + behind);
+            }
+        }
+        let (mut mask, mut near, mut by) = (0, [[0.0; MANY]; 8], [0; 8]);
+        for slot in 0..8 {
+            by[slot] = nears[slot].less_equal(ends[slot]) & who;
+            mask |= u32::from(by[slot] != 0) << slot;
+            nears[slot].store(&mut near[slot]);
+        }
+        (mask, near, by)
+    }
+}
+
+/// The least of all, by halves.
+#[inline(always)]
+fn least(x: &[f32; MANY]) -> f32 {
+    let of = |a: f32, b: f32| if a < b { a } else { b };
+    of(of(of(x[0], x[4]), of(x[2], x[6])), of(of(x[1], x[5]), of(x[3], x[7])))
+}
+
+/// The greatest of all, likewise.
+#[inline(always)]
+fn greatest(x: &[f32; MANY]) -> f32 {
+    let of = |a: f32, b: f32| if a > b { a } else { b };
+    of(of(of(x[0], x[4]), of(x[2], x[6])), of(of(x[1], x[5]), of(x[3], x[7])))
+}
