@@ -8,7 +8,7 @@ use crate::place::PlaceError;
 use crate::reader::{Decoding, Reader, duplicate, length_of, open_file};
 use crate::records::{AttributeLayout, Brick, Span};
 use crate::resident::Resident;
-use crate::source::{MapSource, ReadSource, Source};
+use crate::source::{ByteSource, MapSource, ReadSource};
 use crate::validate;
 use crate::verify::{VerifyReport, verify_source};
 use std::borrow::Cow;
@@ -32,9 +32,9 @@ pub enum Access {
 pub struct SceneFile {
     path: PathBuf,
     /// What the file is read by on opening and by [`Self::verify`]: never a map.
-    file: Arc<dyn Source>,
+    file: Arc<dyn ByteSource>,
     /// What payloads are copied from.
-    source: Arc<dyn Source>,
+    source: Arc<dyn ByteSource>,
     file_bytes: u64,
     resident_bytes: u64,
     checksum: u64,
@@ -48,7 +48,7 @@ impl SceneFile {
     /// Reads and checks the header, the directory and the resident part, and nothing else.
     pub fn open(path: impl AsRef<Path>) -> Result<SceneFile, Error> {
         let (path, file) = open_file(path.as_ref())?;
-        let source: Arc<dyn Source> = match MapSource::new(duplicate(&path, &file)?) {
+        let source: Arc<dyn ByteSource> = match MapSource::new(duplicate(&path, &file)?) {
             Ok(map) => Arc::new(map),
             Err(_) => Arc::new(ReadSource::new(duplicate(&path, &file)?)),
         };
@@ -59,7 +59,7 @@ impl SceneFile {
     pub fn open_with(path: impl AsRef<Path>, access: Access) -> Result<SceneFile, Error> {
         let (path, file) = open_file(path.as_ref())?;
         let duplicate = duplicate(&path, &file)?;
-        let source: Arc<dyn Source> = match access {
+        let source: Arc<dyn ByteSource> = match access {
             Access::Map => Arc::new(MapSource::new(duplicate).map_err(|source| Error::Io {
                 path: path.clone(),
                 action: "map the file into memory; open it with positional reads".to_owned(),
@@ -74,14 +74,20 @@ impl SceneFile {
     /// Opens a scene file that is part of the program, or otherwise in memory; `name` stands for its path in messages.
     /// As [`Self::open`].
     pub fn from_bytes(name: impl Into<PathBuf>, bytes: impl Into<Cow<'static, [u8]>>) -> Result<SceneFile, Error> {
-        let bytes: Arc<dyn Source> = Arc::new(Arc::new(bytes.into()));
+        let bytes: Arc<dyn ByteSource> = Arc::new(Arc::new(bytes.into()));
         Self::load(name.into(), bytes.clone(), bytes)
     }
 
+    /// Opens a scene file that lies elsewhere; `name` stands for its path in messages. As [`Self::open`].
+    pub fn from_source(name: impl Into<PathBuf>, source: Arc<dyn ByteSource>) -> Result<SceneFile, Error> {
+        Self::load(name.into(), source.clone(), source)
+    }
+
     /// Reads the resident part. It comes by positional reads, so that a failing disk is an error here, not a signal.
-    fn load(path: PathBuf, file: Arc<dyn Source>, source: Arc<dyn Source>) -> Result<SceneFile, Error> {
+    fn load(path: PathBuf, file: Arc<dyn ByteSource>, source: Arc<dyn ByteSource>) -> Result<SceneFile, Error> {
         let reader = Reader { path: &path, source: &*file };
         let header = reader.header(length_of(&path, &*file)?)?;
+        reader.announce_resident(&header);
         let directory = reader.directory(&header)?;
         let resident = Resident {
             manifest: reader.manifest(&directory)?,
@@ -227,6 +233,38 @@ impl SceneFile {
             validated.store(true, Ordering::Relaxed);
         }
         Ok(())
+    }
+
+    /// Says that these payloads will be copied next, each once; see [`ByteSource::announce`].
+    pub fn announce(&self, payloads: impl IntoIterator<Item = Payload>) {
+        if self.source.announced_bytes().is_some() {
+            let spans = payloads.into_iter().filter_map(|payload| self.resident.span(payload));
+            let ranges: Vec<_> = spans.filter(|span| span.bytes > 0).map(|span| span.range()).collect();
+            self.source.announce(&ranges);
+        }
+    }
+
+    /// Most bytes of payloads to announce at a time; `None`: announcing has no effect.
+    pub fn announced_bytes(&self) -> Option<u64> {
+        self.source.announced_bytes()
+    }
+
+    /// `payloads` in parts, each of which was announced; all of them where announcing has no effect.
+    pub fn in_parts<'a>(&'a self, payloads: &'a [Payload]) -> impl Iterator<Item = &'a [Payload]> {
+        let most = self.announced_bytes().unwrap_or(u64::MAX);
+        let mut rest = payloads;
+        std::iter::from_fn(move || {
+            let mut bytes = 0u64;
+            let fits = |payload: &&Payload| {
+                bytes = bytes.saturating_add(self.resident.span(**payload).map_or(0, |span| span.bytes));
+                bytes <= most
+            };
+            let count = rest.iter().take_while(fits).count().max(1).min(rest.len());
+            let (part, after) = rest.split_at(count);
+            rest = after;
+            self.announce(part.iter().copied());
+            (!part.is_empty()).then_some(part)
+        })
     }
 
     /// The occupancy of a brick in all levels, checked as [`Self::copy`] does.

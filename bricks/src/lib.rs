@@ -55,6 +55,7 @@ pub use payload::Payload;
 pub use place::{Bounds, Grid, PlaceError, REACH_STEPS, ceil_shift, image_bounds, world_box};
 pub use records::*;
 pub use resident::Resident;
+pub use source::ByteSource;
 pub use texture::{BLOCK_TEXELS, TILE_TEXELS, TilePlace};
 pub use verify::{VerifyReport, verify_file};
 pub use writer::{Partial, Writer, Written};

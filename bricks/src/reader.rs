@@ -10,7 +10,7 @@ use crate::manifest::Manifest;
 use crate::pack;
 use crate::payload::Payload;
 use crate::records::{Brick, Span};
-use crate::source::Source;
+use crate::source::ByteSource;
 use bytemuck::{Pod, Zeroable};
 use std::fs::File;
 use std::io;
@@ -33,7 +33,7 @@ pub(crate) fn duplicate(path: &Path, file: &File) -> Result<File, Error> {
 }
 
 /// Length of `file` now.
-pub(crate) fn length_of(path: &Path, file: &dyn Source) -> Result<u64, Error> {
+pub(crate) fn length_of(path: &Path, file: &dyn ByteSource) -> Result<u64, Error> {
     file.length().map_err(|source| open_error(path, source))
 }
 
@@ -76,7 +76,7 @@ pub(crate) struct Decoding {
 /// Reads parts of a file, each checked against its checksum.
 pub(crate) struct Reader<'a> {
     pub(crate) path: &'a Path,
-    pub(crate) source: &'a dyn Source,
+    pub(crate) source: &'a dyn ByteSource,
 }
 
 impl Reader<'_> {
@@ -91,12 +91,27 @@ impl Reader<'_> {
         self.source.read_at(offset, out).map_err(|source| Error::Io {
             path: self.path.to_owned(),
             action: match source.kind() {
+                // What is not a file says by itself what to do.
+                _ if !self.source.is_file() => format!("read {part}"),
                 io::ErrorKind::UnexpectedEof => format!("read {part}, the file has become shorter; convert again"),
                 _ => format!("read {part}; copy the file to another disk, or convert again"),
             },
             part: Some(part),
             source,
         })
+    }
+
+    /// As [`Self::bytes`], and compares the checksum of what came with `expected`.
+    fn checked(&self, part: Part, offset: u64, out: &mut [u8], expected: u64) -> Result<(), Error> {
+        let mut times = 0;
+        loop {
+            self.bytes(part, offset, out)?;
+            let found = xxh3_64(out);
+            if found == expected || !self.source.distrust(offset..offset + out.len() as u64, times) {
+                return self.corrupt(part, found, expected);
+            }
+            times += 1;
+        }
     }
 
     fn corrupt(&self, part: Part, found: u64, expected: u64) -> Result<(), Error> {
@@ -106,12 +121,25 @@ impl Reader<'_> {
         Err(Error::Corrupt { path: self.path.to_owned(), part, found, expected })
     }
 
+    /// Announces what follows the payloads.
+    pub(crate) fn announce_resident(&self, header: &Header) {
+        self.source.announce(&[header.directory_offset..header.file_bytes]);
+    }
+
     /// Reads the header of a file of `length` bytes. Nothing in it is used before its checksum is found right, except
     /// the magic and the version, which have their place in every version.
     pub(crate) fn header(&self, length: u64) -> Result<Header, Error> {
         let mut page = [0; PAGE_BYTES as usize];
         let start = length.min(PAGE_BYTES) as usize;
-        self.bytes(Part::Header, 0, &mut page[..start])?;
+        let mut times = 0;
+        loop {
+            self.bytes(Part::Header, 0, &mut page[..start])?;
+            let (header, checksum) = Header::read(&page);
+            if header.checksum == checksum || !self.source.distrust(0..start as u64, times) {
+                break;
+            }
+            times += 1;
+        }
         let magic = &page[..start.min(MAGIC.len())];
         if magic != &MAGIC[..magic.len()] || magic.is_empty() {
             return Err(Error::NotSceneFile { path: self.path.to_owned(), found: magic.to_vec() });
@@ -157,8 +185,8 @@ impl Reader<'_> {
     /// ones only with records, and tile the rest of the file.
     pub(crate) fn directory(&self, header: &Header) -> Result<Directory, Error> {
         let mut entries = vec![DirectoryEntry::zeroed(); (header.directory_bytes / ENTRY_BYTES) as usize];
-        self.bytes(Part::Directory, header.directory_offset, bytemuck::cast_slice_mut(&mut entries))?;
-        self.corrupt(Part::Directory, xxh3_64(bytemuck::cast_slice(&entries)), header.directory_checksum)?;
+        let (bytes, expected) = (bytemuck::cast_slice_mut(&mut entries), header.directory_checksum);
+        self.checked(Part::Directory, header.directory_offset, bytes, expected)?;
         let rule = |ok: bool, found: String, expected: String| {
             if ok { Ok(()) } else { Err(self.invalid(Flaw { part: Part::Directory, found, expected })) }
         };
@@ -227,8 +255,7 @@ impl Reader<'_> {
             });
         }
         records.resize(entry.count as usize, T::zeroed());
-        self.bytes(part, entry.offset, bytemuck::cast_slice_mut(&mut records))?;
-        self.corrupt(part, xxh3_64(bytemuck::cast_slice(&records)), entry.checksum)?;
+        self.checked(part, entry.offset, bytemuck::cast_slice_mut(&mut records), entry.checksum)?;
         Ok(records)
     }
 
@@ -247,9 +274,7 @@ impl Reader<'_> {
     /// Copies a payload to `out`, `span.bytes` long, and compares the checksum of the copy.
     pub(crate) fn payload(&self, payload: Payload, span: Span, out: &mut [u8]) -> Result<(), Error> {
         debug_assert!(span.bytes <= MAX_PAYLOAD_BYTES && span.bytes == out.len() as u64);
-        let part = Part::Payload(payload);
-        self.bytes(part, span.offset, out)?;
-        self.corrupt(part, xxh3_64(out), span.checksum)
+        self.checked(Part::Payload(payload), span.offset, out, span.checksum)
     }
 
     /// Copies a payload to `stored`, which grows to its length, as [`Self::payload`].

@@ -5,6 +5,7 @@
 
 use crate::layers::{MATERIAL_ANISOTROPIC, MATERIAL_LAYERS, MATERIAL_MORE};
 use bytemuck::{Pod, Zeroable};
+use std::ops::Range;
 
 /// "No such thing", in every index field that may be absent.
 pub const NONE: u32 = u32::MAX;
@@ -94,6 +95,13 @@ pub struct Span {
     pub bytes: u64,
     /// xxh3-64 of the bytes.
     pub checksum: u64,
+}
+
+impl Span {
+    /// The bytes that it takes in the file.
+    pub fn range(&self) -> Range<u64> {
+        self.offset..self.offset.saturating_add(self.bytes)
+    }
 }
 
 /// [`Brick::flags`]: vertices have a high and a low part (24 bytes).

@@ -1,17 +1,44 @@
-//! Where the bytes of a scene file come from: a memory map, reads at positions, or memory.
+//! Where the bytes of a scene file come from: a memory map, reads at positions, memory, or what a caller brings.
 
 use std::borrow::Cow;
 use std::fs::File;
 use std::io;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Bytes at positions of a file that does not change.
-pub(crate) trait Source: Send + Sync {
+pub trait ByteSource: Send + Sync {
     /// Length of the file now.
+    ///
+    /// # Errors
+    /// It cannot be told.
     fn length(&self) -> io::Result<u64>;
 
-    /// Fills `out` with the bytes at `offset`; [`io::ErrorKind::UnexpectedEof`] if the file ends before.
+    /// Fills `out` with the bytes at `offset`.
+    ///
+    /// # Errors
+    /// [`io::ErrorKind::UnexpectedEof`] if the file ends before; it cannot be read.
     fn read_at(&self, offset: u64, out: &mut [u8]) -> io::Result<()>;
+
+    /// Says that each of these spans will be read next, once. A source that is far away fetches them together; what it
+    /// could not fetch is an error of [`Self::read_at`].
+    fn announce(&self, _spans: &[Range<u64>]) {}
+
+    /// Most bytes to announce at a time, unless one span is longer. `None`: announcing has no effect.
+    fn announced_bytes(&self) -> Option<u64> {
+        None
+    }
+
+    /// Says that the bytes of a span are not those that its checksum is of, and were not so many `times` before. Whether
+    /// reading it once more may bring others.
+    fn distrust(&self, _span: Range<u64>, _times: u32) -> bool {
+        false
+    }
+
+    /// Whether it is a file of this machine, which can be copied and converted again.
+    fn is_file(&self) -> bool {
+        true
+    }
 }
 
 /// Reads at positions, without a shared cursor.
@@ -26,7 +53,7 @@ impl ReadSource {
     }
 }
 
-impl Source for ReadSource {
+impl ByteSource for ReadSource {
     fn length(&self) -> io::Result<u64> {
         self.file.metadata().map(|metadata| metadata.len())
     }
@@ -72,7 +99,7 @@ impl MapSource {
     }
 }
 
-impl Source for MapSource {
+impl ByteSource for MapSource {
     fn length(&self) -> io::Result<u64> {
         self.file.metadata().map(|metadata| metadata.len())
     }
@@ -94,7 +121,7 @@ impl Source for MapSource {
 }
 
 /// A file in memory.
-impl Source for Arc<Cow<'static, [u8]>> {
+impl ByteSource for Arc<Cow<'static, [u8]>> {
     fn length(&self) -> io::Result<u64> {
         Ok(self.len() as u64)
     }

@@ -8,9 +8,10 @@ use crate::payload::Payload;
 use crate::reader::{Decoding, Directory, Reader, length_of, open_file};
 use crate::records::{AttributeLayout, Brick, Span, Texture};
 use crate::resident::Resident;
-use crate::source::{ReadSource, Source};
+use crate::source::{ByteSource, ReadSource};
 use crate::validate;
 use rayon::prelude::*;
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Bytes of payloads that threads share out before progress is reported, unless a single payload is longer.
@@ -57,7 +58,7 @@ pub fn verify_file(path: impl AsRef<Path>, progress: &mut dyn FnMut(u64, u64)) -
 /// As [`verify_file`], for a file of `length` bytes.
 pub(crate) fn verify_source(
     path: &Path,
-    source: &dyn Source,
+    source: &dyn ByteSource,
     length: u64,
     progress: &mut dyn FnMut(u64, u64),
 ) -> VerifyReport {
@@ -103,6 +104,7 @@ impl Verifier<'_> {
         let header = self.reader.header(length);
         let header = self.keep(header)?;
         self.advance(PAGE_BYTES);
+        self.reader.announce_resident(&header);
         let directory = self.reader.directory(&header);
         let directory = self.keep(directory)?;
         self.advance(header.directory_bytes);
@@ -174,10 +176,8 @@ impl Verifier<'_> {
         };
         let valid = whole && self.keep_flaw(validate::resident(&resident));
         let tiled = whole && self.keep_flaw(validate::spans(&resident, header.directory_offset));
-        self.payloads(&resident, header.directory_offset, valid && tiled);
-        if tiled {
-            self.payload_padding(&resident, header.directory_offset);
-        }
+        let paddings = self.payloads(&resident, header.directory_offset, valid && tiled, tiled);
+        self.report.problems.extend(paddings);
         self.section_padding(header, directory);
     }
 
@@ -186,8 +186,9 @@ impl Verifier<'_> {
         self.keep(records)
     }
 
-    /// Every payload in order of the file; what is in it only if the resident part is `valid`.
-    fn payloads(&mut self, resident: &Resident, payload_end: u64, valid: bool) {
+    /// Every payload in order of the file; what is in it only if the resident part is `valid`. With payloads that are
+    /// `tiled`, the zeros between them as well: what is wrong with those is returned, in the order of the payloads.
+    fn payloads(&mut self, resident: &Resident, payload_end: u64, valid: bool, tiled: bool) -> Vec<Error> {
         // What lies outside is reported by the checks of the resident part, or by those of the section that made them
         // impossible.
         let inside = |span: &Span| {
@@ -195,6 +196,7 @@ impl Verifier<'_> {
         };
         let mut payloads: Vec<_> = resident.payloads().filter(|(_, span)| inside(span)).collect();
         payloads.sort_unstable_by_key(|(payload, span)| (span.offset, *payload));
+        let mut paddings = HashMap::new();
         let mut rest = &payloads[..];
         while !rest.is_empty() {
             let mut bytes = 0;
@@ -205,26 +207,38 @@ impl Verifier<'_> {
             let (batch, after) = rest.split_at(rest.iter().take_while(fits).count().max(1));
             rest = after;
             let reader = &self.reader;
+            if reader.source.announced_bytes().is_some() {
+                // With the padding behind it.
+                let end = |span: &Span| if tiled { padded_end(span) } else { span.range().end };
+                let own = batch.iter().map(|(_, span)| span.offset..end(span));
+                // Geometry is compared with the occupancy of its brick.
+                let maps = batch.iter().filter(|_| valid).filter_map(|(payload, _)| match payload {
+                    Payload::Geometry(index) => resident.span(Payload::Proxies(*index)),
+                    _ => None,
+                });
+                reader.source.announce(&own.chain(maps.map(|span| span.range())).collect::<Vec<_>>());
+            }
             let check = |buffers: &mut (Vec<u8>, Decoding), &(payload, span): &(Payload, Span)| {
                 let checked = check_payload(reader, resident, (payload, span), valid, buffers);
-                checked.err().map(|error| error.within(resident.place_of(payload)))
+                let checked = checked.err().map(|error| error.within(resident.place_of(payload)));
+                let level = || resident.level_of(payload).map(|_| resident.name_of(payload));
+                let part = Part::PaddingAfterPayload(payload);
+                let padding = || check_padding(reader, part, span.range().end, padded_end(&span)).err();
+                let padding = if tiled { padding().map(|error| (payload, error.within(level()))) } else { None };
+                (checked, padding)
             };
             // The collection keeps the order of the batch.
-            let problems: Vec<Option<Error>> = batch.par_iter().map_init(Default::default, check).collect();
-            self.report.problems.extend(problems.into_iter().flatten());
+            let problems: Vec<(Option<Error>, _)> = batch.par_iter().map_init(Default::default, check).collect();
+            for (problem, padding) in problems {
+                self.report.problems.extend(problem);
+                paddings.extend(padding);
+            }
             self.report.payloads += batch.len() as u64;
-            self.advance(batch.iter().map(|(_, span)| span.bytes).sum());
+            let end = |span: &Span| if tiled { padded_end(span) } else { span.range().end };
+            self.advance(batch.iter().map(|(_, span)| end(span) - span.offset).sum());
         }
-    }
-
-    /// Zeros between payloads that tile the file.
-    fn payload_padding(&mut self, resident: &Resident, payload_end: u64) {
-        for (payload, span) in resident.payloads() {
-            let end = span.offset + span.bytes;
-            debug_assert!(end.next_multiple_of(PAGE_BYTES) <= payload_end);
-            let level = resident.level_of(payload).map(|_| resident.name_of(payload));
-            self.padding((Part::PaddingAfterPayload(payload), level), end, end.next_multiple_of(PAGE_BYTES));
-        }
+        debug_assert!(!tiled || payloads.iter().all(|(_, span)| padded_end(span) <= payload_end));
+        resident.payloads().filter_map(|(payload, _)| paddings.remove(&payload)).collect()
     }
 
     /// Zeros between directory and sections, which tile the rest of the file.
@@ -232,25 +246,36 @@ impl Verifier<'_> {
         let mut part = Part::PaddingAfterDirectory;
         let mut end = header.directory_offset + header.directory_bytes;
         for (section, entry) in directory.iter() {
-            self.padding((part, None), end, entry.offset);
+            let checked = check_padding(&self.reader, part, end, entry.offset);
+            self.keep(checked);
+            self.advance(entry.offset - end);
             part = Part::PaddingAfterSection(*section);
             end = entry.offset + entry.bytes;
         }
     }
+}
 
-    /// Checks that less than a page of bytes is zero, which are `part`, of `place`.
-    fn padding(&mut self, (part, place): (Part, Option<String>), start: u64, end: u64) {
-        let mut page = [0; PAGE_BYTES as usize];
-        let page = &mut page[..(end - start) as usize];
-        let read = self.reader.bytes(part, start, page).map_err(|error| error.within(place.clone()));
-        if self.keep(read).is_some()
-            && let Some(at) = page.iter().position(|&byte| byte != 0)
-        {
-            let (path, offset) = (self.reader.path.to_owned(), start + at as u64);
-            let problem = Error::Padding { path, part, offset, found: page[at] };
-            self.report.problems.push(problem.within(place));
+/// Where the zeros after a payload end.
+fn padded_end(span: &Span) -> u64 {
+    span.range().end.next_multiple_of(PAGE_BYTES)
+}
+
+/// Checks that less than a page of bytes is zero, which are `part`.
+fn check_padding(reader: &Reader, part: Part, start: u64, end: u64) -> Result<(), Error> {
+    let mut page = [0; PAGE_BYTES as usize];
+    let page = &mut page[..(end - start) as usize];
+    if page.is_empty() {
+        return Ok(());
+    }
+    let mut times = 0;
+    loop {
+        reader.bytes(part, start, page)?;
+        let Some(at) = page.iter().position(|&byte| byte != 0) else { return Ok(()) };
+        if !reader.source.distrust(start..end, times) {
+            let (path, offset) = (reader.path.to_owned(), start + at as u64);
+            return Err(Error::Padding { path, part, offset, found: page[at] });
         }
-        self.advance(end - start);
+        times += 1;
     }
 }
 

@@ -7,7 +7,7 @@ use crate::layout::{DirectoryEntry, Header, MAGIC, MAX_PAYLOAD_BYTES, PAGE_BYTES
 use crate::payload::Payload;
 use crate::records::Span;
 use crate::resident::Resident;
-use crate::source::{ReadSource, Source};
+use crate::source::{ByteSource, ReadSource};
 use crate::validate;
 use std::borrow::Cow;
 use std::fs::{self, File, OpenOptions, TryLockError};

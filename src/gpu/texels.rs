@@ -44,6 +44,7 @@ impl Texels {
         let pages: Vec<_> = page_sizes.iter().map(|&bytes| storage(gpu, "texels", bytes as usize / 16, 16)).collect();
         let mut records = Vec::with_capacity(places.len());
         let mut bytes = Vec::new();
+        scene.announce((0..resident.textures.len() as u32).map(Payload::Texture));
         for (i, (texture, &(page, offset))) in (0u32..).zip(resident.textures.iter().zip(&places)) {
             bytes.resize(texture.tail.bytes as usize, 0);
             scene.copy(Payload::Texture(i), &mut bytes).map_err(device_error)?;

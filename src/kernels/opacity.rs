@@ -21,6 +21,7 @@ pub fn table(scene: &SceneFile) -> Result<Vec<[u32; 4]>, Error> {
     }
     let mut table = vec![[0u32; 4]; 2 * resident.materials.len()];
     let mut starts = Vec::with_capacity(resident.opacity_maps.len());
+    scene.announce((0..resident.opacity_maps.len() as u32).map(Payload::Opacity));
     for (index, map) in (0u32..).zip(&resident.opacity_maps) {
         let start = table.len();
         table.resize(start + map.texels.bytes as usize / 16, [0; 4]);

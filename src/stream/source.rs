@@ -35,6 +35,14 @@ pub trait PayloadSource: Send + Sync + 'static {
     /// The payload is corrupt or cannot be read.
     fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError>;
 
+    /// Says that these items will be copied next, each once: what comes from far away is fetched together.
+    fn announce(&self, _items: &[Item]) {}
+
+    /// Most bytes of items to announce at a time, unless one is longer; `None`: announcing has no effect.
+    fn announced_bytes(&self) -> Option<u64> {
+        None
+    }
+
     /// Bytes of everything, as [`super::Residency::new`] wants them.
     fn sizes(&self) -> Sizes {
         let brick = |brick| (self.bytes(Item::geometry(brick)), self.bytes(Item::attributes(brick)));
@@ -71,5 +79,13 @@ impl PayloadSource for SceneFile {
 
     fn copy(&self, item: Item, out: &mut [u8]) -> Result<(), SourceError> {
         Ok(SceneFile::copy(self, item.into(), out)?)
+    }
+
+    fn announce(&self, items: &[Item]) {
+        SceneFile::announce(self, items.iter().map(|&item| item.into()));
+    }
+
+    fn announced_bytes(&self) -> Option<u64> {
+        SceneFile::announced_bytes(self)
     }
 }

@@ -157,7 +157,26 @@ impl Workers {
             };
             Loaded { item, destination, result }
         };
-        let loaded: Vec<_> = self.threads.install(|| jobs.into_par_iter().with_max_len(1).map(answer).collect());
+        let copied = |(item, _, cached, _): &(Item, D, Option<Arc<[u8]>>, Option<Reservation>)| {
+            (cached.is_none() && known(*item)).then_some(*item)
+        };
+        let mut loaded = Vec::with_capacity(jobs.len());
+        let mut jobs = jobs.into_iter().peekable();
+        while jobs.peek().is_some() {
+            // All of them, unless their source is far away: then as many as may be announced together.
+            let (mut part, mut bytes) = (Vec::new(), 0u64);
+            while let Some(job) = jobs.next_if(|job| {
+                bytes = bytes.saturating_add(copied(job).map_or(0, |item| self.source.bytes(item)));
+                part.is_empty() || self.source.announced_bytes().is_none_or(|most| bytes <= most)
+            }) {
+                part.push(job);
+            }
+            if self.source.announced_bytes().is_some() {
+                self.source.announce(&part.iter().filter_map(copied).collect::<Vec<_>>());
+            }
+            loaded
+                .extend(self.threads.install(|| part.into_par_iter().with_max_len(1).map(answer).collect::<Vec<_>>()));
+        }
         self.noted().failed += loaded.iter().filter(|one| one.result.is_err()).count() as u64;
         loaded
     }

@@ -12,5 +12,6 @@ mod malformed;
 mod malformed_payloads;
 mod occupancy;
 mod random;
+mod sources;
 mod surfaces;
 mod writer;

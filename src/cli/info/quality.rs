@@ -412,14 +412,19 @@ fn whole(scene: &SceneFile, top: &TopCost, shares: &[f64]) -> Result<WholeCost> 
     for (leaf, share) in resident.leaves.iter().zip(shares) {
         entered[leaf.brick as usize] += share;
     }
-    let read = |buffer: &mut Vec<u8>, index: usize| -> Result<[f64; 2]> {
-        let payload = Payload::Geometry(index as u32);
+    let read = |buffer: &mut Vec<u8>, (index, &payload): (usize, &Payload)| -> Result<[f64; 2]> {
         buffer.resize(scene.span(payload).bytes as usize, 0);
         scene.copy(payload, buffer)?;
         Ok(in_brick(resident, &resident.bricks[index], buffer))
     };
     // Collected before they are added up, so that the sum does not depend on the threads.
-    let costs: Vec<[f64; 2]> = (0..entered.len()).into_par_iter().map_init(Vec::new, read).collect::<Result<_>>()?;
+    let payloads: Vec<Payload> = (0..entered.len() as u32).map(Payload::Geometry).collect();
+    let mut costs: Vec<[f64; 2]> = Vec::with_capacity(payloads.len());
+    for part in scene.in_parts(&payloads) {
+        let first = costs.len();
+        let read = |buffer: &mut Vec<u8>, (at, payload)| read(buffer, (first + at, payload));
+        costs.extend(part.par_iter().enumerate().map_init(Vec::new, read).collect::<Result<Vec<_>>>()?);
+    }
     let (mut nodes, mut triangles) = (top.wide_nodes, 0.0);
     for (share, [own_nodes, own_triangles]) in entered.iter().zip(costs) {
         nodes += share * own_nodes;

@@ -25,6 +25,7 @@ impl Texels {
     /// A texture that cannot be read or verified.
     pub fn new(scene: &SceneFile) -> Result<Self, ExecutorError> {
         let resident = scene.resident();
+        scene.announce((0..resident.textures.len() as u32).map(Payload::Texture));
         let read = |(i, texture): (u32, &bricks::Texture)| {
             let mut words = vec![0u32; texture.tail.bytes as usize / 4];
             scene

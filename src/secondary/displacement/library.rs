@@ -7,7 +7,7 @@ use super::subject::Subject;
 use crate::kernels::FrameExecutor;
 use crate::kernels::layout::{DisplacementField, DisplacementPosition, NONE};
 use crate::schedule::ExecutorError;
-use bricks::{Resident, SceneFile};
+use bricks::{Payload, Resident, SceneFile};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -130,6 +130,7 @@ impl Library {
         executor.reserve(&FAMILY, &[0, 0, fields.len(), table.len(), words as usize, fields.len()])?;
         executor.write(&FAMILY, FIELDS, 0, bytemuck::cast_slice(&fields));
         executor.write(&FAMILY, TABLE, 0, bytemuck::cast_slice(&table));
+        scene.announce(chosen.iter().map(|&number| Payload::Displacement(number as u32)));
         for &number in chosen {
             let bytes = scene.displacement(number as u32).map_err(unread)?;
             executor.write(&FAMILY, CODES, 4 * fields[number].codes as usize, &bytes);

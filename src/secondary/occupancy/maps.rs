@@ -1,6 +1,6 @@
 //! The 64³ maps of bricks, read when they are asked for, within a budget.
 
-use bricks::{Error, OCCUPANCY_BYTES, OccupancyMap, SceneFile};
+use bricks::{Error, OCCUPANCY_BYTES, OccupancyMap, Payload, SceneFile};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -28,6 +28,8 @@ impl Maps {
             Some(map) => Ok(map.clone()),
             None => self.file.occupancy(*brick).map(Arc::new),
         };
+        let missing = bricks.iter().filter(|brick| !self.held.contains(brick));
+        self.file.announce(missing.map(|&brick| Payload::Proxies(brick)));
         let maps: Vec<Arc<OccupancyMap>> = bricks.par_iter().map(map).collect::<Result<_, _>>()?;
         for (&brick, map) in bricks.iter().zip(&maps) {
             self.held.put(brick, map.clone());
