@@ -83,6 +83,7 @@ pub mod picture;
 pub mod query;
 #[cfg(feature = "lab")]
 pub mod reference;
+pub mod remote;
 pub mod scene;
 pub mod schedule;
 pub mod secondary;

@@ -3,6 +3,7 @@
 use super::interrupt;
 use super::options::args::BakeDisplacementArgs;
 use crate::cli::output::{note, warn};
+use crate::remote;
 use crate::secondary::displacement::make::{Making, Outcome, Watch, add_fields};
 use crate::secondary::displacement::{Bench, Shape};
 use crate::session::trace::for_rays;
@@ -52,6 +53,7 @@ pub fn run(args: &BakeDisplacementArgs) -> Result<()> {
         bits: args.bits,
     };
     let output = args.output.as_deref().unwrap_or(&args.scene);
+    remote::refuse(&args.scene, "bake-displacement")?;
     add(&args.scene, output, &making, args.memory.unwrap_or(MEMORY), &args.adapter)
 }
 

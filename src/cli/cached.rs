@@ -8,6 +8,7 @@ use super::convert::{summarise, usage};
 use super::interrupt;
 use crate::cli::output::{is_quiet, one_line};
 use crate::output::atomic;
+use crate::remote;
 use crate::settings::folder::{self, CACHE_VARIABLE};
 use anyhow::{Context, Result, bail};
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
@@ -66,7 +67,7 @@ fn folder() -> Result<PathBuf> {
     folder::cache().with_context(|| format!("there is no folder for converted models; name one in {CACHE_VARIABLE}"))
 }
 
-/// The scene file that `path` stands for: `path` itself, or of a model the converted one.
+/// The scene file that `path` stands for: `path` itself, of a URL its name, of a model the converted one.
 ///
 /// # Errors
 /// The model is missing or bad; the cache folder cannot be written to.
@@ -84,8 +85,8 @@ pub fn scene_quietly(path: &Path, progress: &Progress) -> Result<PathBuf> {
 }
 
 fn scene_told(path: &Path, progress: Option<&Progress>, say: &dyn Fn(&str)) -> Result<PathBuf> {
-    if !is_model(path) {
-        return Ok(path.into());
+    if remote::is_url(path) || !is_model(path) {
+        return Ok(remote::name(path));
     }
     let model = path.canonicalize().with_context(|| {
         format!("{}: cannot be read; check the path and its permissions, or give a .bricks file", path.display())

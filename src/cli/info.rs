@@ -8,7 +8,7 @@ use super::cached;
 use super::options::args::InfoArgs;
 use crate::cli::output::{print, print_json};
 use crate::secondary::displacement::is_similarity;
-use crate::session::Origin;
+use crate::session::{Origin, open_scene};
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use crate::stream::PayloadSource;
 use crate::stream::Residency;
@@ -35,7 +35,7 @@ const REACH_STEPS: i64 = 1 << 44;
 /// # Errors
 /// The file cannot be opened or is damaged, or no triangle has the id that was asked for.
 pub fn run(args: &InfoArgs) -> Result<()> {
-    let scene = SceneFile::open(cached::scene(&args.scene)?)?;
+    let scene = open_scene(&cached::scene(&args.scene)?)?;
     if let Some(id) = args.id {
         let origin = origin(&scene, id)?;
         return if args.json { print_json(&Told { format: FORMAT, origin }) } else { print(&origin.human()) };

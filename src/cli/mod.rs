@@ -29,6 +29,7 @@ pub mod view;
 pub mod walk;
 pub mod watcher;
 
+use crate::remote;
 use clap::{CommandFactory, Parser};
 use options::args::{Cli, Command};
 use options::removed;
@@ -62,8 +63,11 @@ pub fn main() -> ExitCode {
         }
     };
     cli.verbosity.set();
+    remote::keep_on_disk(cli.disk_cache.clone());
     // Whatever is half done is dropped with the call: a panic leaves nothing behind that is used afterwards.
-    match catch_unwind(AssertUnwindSafe(|| run(&cli.command))) {
+    let done = catch_unwind(AssertUnwindSafe(|| run(&cli.command)));
+    output::warn(remote::take_warnings());
+    match done {
         Ok(Ok(())) => ExitCode::SUCCESS,
         Ok(Err(error)) => report(&error),
         Err(_) => ExitCode::from(BAD_INPUT),

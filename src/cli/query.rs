@@ -5,9 +5,11 @@ use super::options::query_args::{Kind, QueryArgs};
 use crate::cli::output::print_json;
 use crate::output::npy::{self, Hit, Ray, Rays, Rows};
 use crate::query::{Closest, Queries, Watch};
+use crate::remote;
+use crate::session::open_unmapped;
 use crate::session::trace::check;
 use anyhow::{Context, Result};
-use bricks::{Access, SceneFile};
+use bricks::SceneFile;
 use brickwalk_convert::progress::Progress;
 use std::path::Path;
 use std::sync::Arc;
@@ -21,8 +23,7 @@ pub fn run(args: &QueryArgs) -> Result<()> {
     // Said before the work rather than after it.
     let input = Input::read(args)?;
     let path = &cached::scene(&args.scene)?;
-    // What is read counts as this program's memory only while it is held.
-    let scene = Arc::new(SceneFile::open_with(path, Access::Read)?);
+    let scene = open_unmapped(path)?;
     let progress = Progress::new();
     progress.phase(input.name(), input.len());
     let (answers, stats) = ask(args, scene, &input, &progress).with_context(|| path.display().to_string())?;
@@ -33,6 +34,9 @@ pub fn run(args: &QueryArgs) -> Result<()> {
         if let (Some(report), serde_json::Value::Object(stats)) = (report.as_object_mut(), stats) {
             report.extend(stats);
             report.insert("seconds".into(), start.elapsed().as_secs_f64().into());
+            if let Some(traffic) = remote::traffic(path) {
+                report.insert("remote".into(), serde_json::json!(traffic));
+            }
         }
         print_json(&report)?;
     }

@@ -9,6 +9,7 @@ use super::convert::{expand, mesh_settings, usage, work_settings};
 use super::options::args::RepairArgs;
 use super::{interrupt, verify};
 use crate::cli::output::{Usage, note};
+use crate::remote;
 use crate::secondary::displacement::make::make_again;
 use crate::session::trace::for_rays;
 use crate::session::{Opened, Settings as Walk, open_scene};
@@ -36,6 +37,7 @@ use xxhash_rust::xxh3::xxh3_64;
 /// More than bricks and textures is damaged, the inputs or options are not those of the conversion (nothing is changed
 /// then), or the file cannot be written.
 pub fn run(args: &RepairArgs) -> Result<()> {
+    remote::refuse(&args.scene, "repair")?;
     let name = args.scene.display();
     let scene = SceneFile::open(&args.scene)?;
     let progress = interrupt::job();

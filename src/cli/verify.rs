@@ -2,6 +2,7 @@
 
 use super::options::args::VerifyArgs;
 use crate::cli::output::note;
+use crate::remote;
 use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Result, bail};
 use bricks::{Error, Part, Payload, Section, VerifyReport};
@@ -16,7 +17,10 @@ const LISTED: usize = 8;
 /// The file cannot be opened, or something in it is not as it was written; the message names every damaged part, bricks
 /// by their number.
 pub fn run(args: &VerifyArgs) -> Result<()> {
-    let report = watched(&Progress::new(), |progress| bricks::verify_file(&args.scene, progress))?;
+    let report = watched(&Progress::new(), |progress| match remote::is_url(&args.scene) {
+        true => Ok(remote::open(&args.scene)?.verify(progress)?),
+        false => Ok::<_, anyhow::Error>(bricks::verify_file(&args.scene, progress)?),
+    })?;
     if let Some(message) = problems(&report) {
         bail!("{message}");
     }

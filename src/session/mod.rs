@@ -28,7 +28,7 @@ pub use crate::output::npy::{Hit, Ray};
 pub use extent::extent;
 pub use nodes::{Named, SceneNode, find, nodes};
 pub use open::{Frame, LeftOut, Session, Watch, developed, levelled};
-pub use opened::{Opened, open_scene};
+pub use opened::{Opened, open_scene, open_unmapped};
 pub use origin::{Origin, provenance};
 pub use pictures::{Pictures, Preview};
 pub use settings::{Settings, TRACE};

@@ -17,6 +17,7 @@ use crate::output::{exr, png, srgb};
 use crate::picture::denoise::Resolve;
 use crate::picture::exposure::Meter;
 use crate::picture::tone_map::ToneMap;
+use crate::remote;
 use crate::scene::Camera;
 use crate::scene::Picture;
 use crate::scene::path::CameraPath;
@@ -163,7 +164,7 @@ impl Session {
     /// # Errors
     /// Settings that do not go together; a bad scene, path, motion, environment or cache; the device's.
     pub fn open(file: impl AsRef<Path>, settings: &Settings) -> Result<Self> {
-        let file = file.as_ref();
+        let file = &remote::name(file.as_ref());
         settings.check()?;
         let references = References::open(settings)?;
         let scene = open_scene(file)?;

@@ -7,6 +7,7 @@ use crate::cpu::available_memory;
 use crate::kernels::shade::more;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::output::atomic;
+use crate::remote;
 use crate::schedule::ExecutorError;
 use crate::schedule::cache::Cache;
 use crate::session::Settings;
@@ -14,7 +15,7 @@ use crate::settings::sizes::{counted, human_bytes, option_bytes};
 use crate::settings::{CacheSize, Schedule};
 use crate::stream::{HostCache, PayloadSource, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
-use bricks::SceneFile;
+use bricks::{Access, SceneFile};
 use std::path::Path;
 use std::sync::Arc;
 use tracing::info;
@@ -49,12 +50,20 @@ pub struct Needs<'a> {
     pub setup: Setup,
 }
 
-/// Opens a scene file.
+/// Opens a scene: a file, or a URL ([`remote`]).
 ///
 /// # Errors
 /// It is missing, no scene, or damaged.
 pub fn open_scene(path: &Path) -> Result<Arc<SceneFile>> {
-    Ok(Arc::new(SceneFile::open(path)?))
+    Ok(Arc::new(if remote::is_url(path) { remote::open(path)? } else { SceneFile::open(path)? }))
+}
+
+/// As [`open_scene`], without a map: what is read counts as this program's memory only while it is held.
+///
+/// # Errors
+/// As [`open_scene`].
+pub fn open_unmapped(path: &Path) -> Result<Arc<SceneFile>> {
+    Ok(Arc::new(if remote::is_url(path) { remote::open(path)? } else { SceneFile::open_with(path, Access::Read)? }))
 }
 
 /// Room for which an allocation that fails is not tried with half of it.

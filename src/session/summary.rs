@@ -4,6 +4,7 @@ use super::auto::Auto;
 use super::open::{LeftOut, Session};
 use crate::counters::Record;
 use crate::frame::Renderer;
+use crate::remote;
 use crate::session::Settings;
 use crate::settings::{FrameBudget, Length, Schedule, Value as _};
 use serde_json::{Map, Value, json};
@@ -23,7 +24,7 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: LeftOut, vid
     let brick_bytes = streamed_bytes - tile_bytes;
     let mut reports: Map<String, Value> =
         renderer.methods.iter().flat_map(|method| method.report()).map(|(name, value)| (name.into(), value)).collect();
-    json!({
+    let mut summary = json!({
         "format": FORMAT,
         "version": env!("CARGO_PKG_VERSION"),
         "commit": env!("BRICKWALK_COMMIT"),
@@ -122,7 +123,11 @@ pub fn summary(session: &mut Session, records: &[Record], left_out: LeftOut, vid
         "passes": passes(records),
         "unresolved_pixels": records.iter().map(|r| r.unresolved_pixels).sum::<u64>(),
         "non_finite": records.iter().map(|r| r.non_finite).sum::<u64>(),
-    })
+    });
+    if let (Some(traffic), Some(summary)) = (remote::traffic(file), summary.as_object_mut()) {
+        summary.insert("remote".into(), json!(traffic));
+    }
+    summary
 }
 
 /// Samples that pixels took on average: camera rays of a pixel.

@@ -2,6 +2,7 @@
 
 use crate::cli::interrupt;
 use crate::cli::options::group_args::{GroupArgs, Of, View};
+use crate::cli::options::scene_name::scene_name;
 use crate::cli::options::units::UNITS;
 use crate::cli::output::{Usage, print};
 use crate::lab::bench::args::{ChcArgs, ExecutorsArgs};
@@ -80,7 +81,7 @@ struct Measured<G: Group> {
 struct MeasuredScenes {
     /// Converted scenes; a Cornell box in which a box orbits (`scene cornell`) is measured beside them. Where
     /// S.motion.json lies beside a scene its flicker is measured
-    #[arg(value_name = "S.bricks")]
+    #[arg(value_name = "S.bricks", value_parser = scene_name())]
     scenes: Vec<PathBuf>,
     /// Everything else.
     #[command(flatten)]

@@ -2,6 +2,7 @@
 
 use super::bench::console;
 use crate::cli::options::group_args::{GroupArgs, View};
+use crate::cli::options::scene_name::scene_name;
 use crate::cli::options::units::UNITS;
 use crate::lab::study;
 use crate::lab::study::args::StudyArgs;
@@ -27,7 +28,7 @@ impl View for OfStudy {
 #[command(after_help = UNITS)]
 pub struct StudyCommand {
     /// The scene
-    #[arg(value_name = "S.bricks")]
+    #[arg(value_name = "S.bricks", value_parser = scene_name())]
     scene: PathBuf,
     /// Folder for the results. Started again with the same folder and settings, a study goes on where it stopped
     #[arg(short, long, value_name = "DIR")]

@@ -7,6 +7,7 @@ use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
 use super::query_args::QueryArgs;
 use super::scene_kind::{SceneKind, scene_help};
+use super::scene_name::scene_name;
 use super::units::UNITS;
 use crate::cli::bake_displacement::Subjects;
 #[cfg(feature = "lab")]
@@ -14,6 +15,7 @@ use crate::cli::lab::bench::{BenchArgs, TestArgs};
 #[cfg(feature = "lab")]
 use crate::cli::lab::study::StudyCommand;
 use crate::cli::output::{Usage, Verbosity};
+use crate::remote::DiskCache;
 use crate::session::Settings;
 use crate::settings::sizes::{count, positive_count, positive_count32, size_bytes};
 use crate::settings::{Adapter, CacheSize, ImageSize, SettingsError};
@@ -33,6 +35,11 @@ pub struct Cli {
     /// How much is said.
     #[command(flatten)]
     pub verbosity: Verbosity,
+    /// Keep parts of scenes from URLs in a folder, up to a size; processes may share it [default: none]
+    ///
+    /// What was not used for longest goes first. Without it, what a run fetches is gone after it.
+    #[arg(long, global = true, display_order = 902, hide_short_help = true, value_name = "DIR,SIZE")]
+    pub disk_cache: Option<DiskCache>,
     /// What to do.
     #[command(subcommand)]
     pub command: Command,
@@ -123,7 +130,7 @@ pub struct AdaptersArgs {
 pub struct CalibrateArgs {
     /// Scenes that get rates of their own. Without any, rates of generated scenes are measured, for all others.
     /// [default: none]
-    #[arg(value_name = "S.bricks")]
+    #[arg(value_name = "S.bricks", value_parser = scene_name())]
     pub scenes: Vec<PathBuf>,
     /// File of rates to write to. What it has of other devices and scenes stays. [default: rates.json in the user's
     /// folder for settings, or in BRICKWALK_CONFIG_DIR]
@@ -354,7 +361,7 @@ pub struct InfoArgs {
     /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
     /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
     /// brickwalk in the user's cache. `convert` has options for how a model is converted
-    #[arg(value_name = "S.bricks|MODEL")]
+    #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: PathBuf,
     /// Print JSON
     #[arg(long)]
@@ -376,7 +383,7 @@ pub struct InfoArgs {
 #[command(after_help = UNITS)]
 pub struct VerifyArgs {
     /// The scene
-    #[arg(value_name = "S.bricks")]
+    #[arg(value_name = "S.bricks", value_parser = scene_name())]
     pub scene: PathBuf,
 }
 
@@ -385,7 +392,7 @@ pub struct VerifyArgs {
 #[command(after_help = UNITS)]
 pub struct RepairArgs {
     /// The scene; damaged bricks and textures are rewritten in place
-    #[arg(value_name = "S.bricks")]
+    #[arg(value_name = "S.bricks", value_parser = scene_name())]
     pub scene: PathBuf,
     /// What the scene was converted from.
     #[command(flatten)]
@@ -404,7 +411,7 @@ pub struct RepairArgs {
 pub struct BakeDisplacementArgs {
     /// The scene; it is written anew with its fields, those that it has are replaced. An interrupted run goes on where
     /// it stopped
-    #[arg(value_name = "S.bricks")]
+    #[arg(value_name = "S.bricks", value_parser = scene_name())]
     pub scene: PathBuf,
     /// The file to write [default: the scene]
     #[arg(short, long, value_name = "S.bricks")]
@@ -448,7 +455,7 @@ pub struct WalkArgs {
     /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
     /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
     /// brickwalk in the user's cache. `convert` has options for how a model is converted
-    #[arg(value_name = "S.bricks|MODEL", required_unless_present = "print_settings")]
+    #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name(), required_unless_present = "print_settings")]
     scene: Option<PathBuf>,
     /// Output folder for frames, records and report; created if missing
     #[arg(short, long, value_name = "DIR", required_unless_present = "print_settings")]
@@ -526,7 +533,7 @@ impl ViewSettings {
 pub struct ViewArgs {
     /// The scene: a .bricks file, or a model, which is converted first, as by `walk`. [default: none; drop one on the
     /// window]
-    #[arg(value_name = "S.bricks|MODEL")]
+    #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: Option<PathBuf>,
     /// Folder for screenshots and paths [default: the current one]
     #[arg(short, long, value_name = "DIR")]
@@ -542,7 +549,7 @@ pub struct ViewArgs {
 #[command(after_help = UNITS)]
 pub struct ServeArgs {
     /// The scene: a .bricks file, or a model, which is converted first, as by `walk`
-    #[arg(value_name = "S.bricks|MODEL")]
+    #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: PathBuf,
     /// Port to listen on; 0: any that is free
     #[arg(long, value_name = "N", default_value_t = 7878)]
@@ -576,7 +583,7 @@ pub struct TraceArgs {
     /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
     /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
     /// brickwalk in the user's cache. `convert` has options for how a model is converted
-    #[arg(value_name = "S.bricks|MODEL")]
+    #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: PathBuf,
     /// Rays: a NumPy array, float64 or float32, shape (N, 8) or (N, 6): origin xyz, direction xyz, t_min, t_max; world
     /// space

@@ -6,4 +6,5 @@ pub mod inputs;
 pub mod query_args;
 pub mod removed;
 pub mod scene_kind;
+pub mod scene_name;
 pub mod units;

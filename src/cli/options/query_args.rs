@@ -1,5 +1,6 @@
 //! Options of `query`.
 
+use super::scene_name::scene_name;
 use super::units::UNITS;
 use crate::settings::CacheSize;
 use crate::settings::sizes::positive_count32;
@@ -43,7 +44,7 @@ pub struct QueryArgs {
     #[arg(value_name = "KIND")]
     pub kind: Kind,
     /// The scene: a .bricks file, or a model, which is converted first, as by `trace`
-    #[arg(value_name = "S.bricks|MODEL")]
+    #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: PathBuf,
     /// Rays or points: a NumPy array, world space
     #[arg(value_name = "IN.npy")]

@@ -2,6 +2,7 @@
 //! lies in the platform's folder for settings, as JSON.
 
 use crate::output::atomic;
+use crate::remote;
 use crate::scene::Camera;
 use crate::settings::folder;
 use serde::{Deserialize, Serialize};
@@ -111,7 +112,7 @@ impl Recent {
 }
 
 fn absolute(path: &Path) -> PathBuf {
-    std::path::absolute(path).unwrap_or_else(|_| path.into())
+    if remote::is_url(path) { path.into() } else { std::path::absolute(path).unwrap_or_else(|_| path.into()) }
 }
 
 #[cfg(test)]

@@ -7,9 +7,10 @@ use crate::render;
 use crate::rows::{Named, Rows, bad_pair, bad_point, bad_ray};
 use crate::worker::{Desk, Progress, Task, Worker, run_alone};
 use anyhow::Result;
-use bricks::{Access, SceneFile};
+use bricks::SceneFile;
 use brickwalk::counters::Counters;
-use brickwalk::session::{Hit, Ray};
+use brickwalk::remote::{self, DiskCache, Traffic};
+use brickwalk::session::{Hit, Ray, open_unmapped};
 use brickwalk::settings::{Adapter, CacheSize};
 use brickwalk::stream::PayloadSource;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -132,6 +133,20 @@ fn start(options: &Options, scene: &Arc<SceneFile>, done: &Shared) -> PyResult<W
     Worker::start(move || Held::new(options, scene, done)).map_err(|error| exception(&error))
 }
 
+/// What was fetched of a scene by URL.
+fn told<'py>(py: Python<'py>, traffic: &Traffic) -> PyResult<Bound<'py, PyDict>> {
+    let dict = PyDict::new(py);
+    dict.set_item("requests", traffic.requests)?;
+    dict.set_item("retries", traffic.retries)?;
+    dict.set_item("bytes_fetched", traffic.bytes_fetched)?;
+    dict.set_item("bytes_needed", traffic.bytes_needed)?;
+    dict.set_item("round_trips", traffic.round_trips)?;
+    dict.set_item("disk_cache_hits", traffic.disk_cache_hits)?;
+    dict.set_item("disk_cache_bytes", traffic.disk_cache_bytes)?;
+    dict.set_item("seconds_waiting", traffic.seconds_waiting)?;
+    Ok(dict)
+}
+
 fn unwritable(error: impl std::fmt::Display) -> PyErr {
     wrong(format!("out: the array cannot be written to: {error}"))
 }
@@ -163,12 +178,19 @@ fn write_rows<T: numpy::Element + Copy, const N: usize>(
 #[pymethods]
 impl Core {
     #[new]
-    fn new(py: Python<'_>, path: PathBuf, cache: &str, adapter: &str) -> PyResult<Self> {
+    #[pyo3(signature = (path, cache, adapter, disk_cache=None))]
+    fn new(py: Python<'_>, path: PathBuf, cache: &str, adapter: &str, disk_cache: Option<&str>) -> PyResult<Self> {
+        let disk: Option<DiskCache> = disk_cache
+            .map(str::parse)
+            .transpose()
+            .map_err(|why| wrong(format!("disk_cache {:?}: {why}", disk_cache.unwrap_or_default())))?;
+        // What is secret of a URL goes no further.
+        let path = remote::name_with(&path, disk);
         let cache: CacheSize = cache.parse().map_err(|why| wrong(format!("cache {cache:?}: {why}")))?;
         let Ok(adapter) = adapter.parse::<Adapter>();
         let file = path.clone();
         // What is read of a map would count as memory of the process.
-        let open = move |_: &Arc<Task>| Ok(Arc::new(SceneFile::open_with(file, Access::Read)?));
+        let open = move |_: &Arc<Task>| open_unmapped(&file);
         let scene = run_alone(py, &mut Progress::new(None, 0), open)?;
         let (options, done) = (Options { path, cache, adapter }, Shared::default());
         let worker = Mutex::new(Some(start(&options, &scene, &done)?));
@@ -233,6 +255,9 @@ impl Core {
         dict.set_item("query_bytes_read", done.queried.bytes_read)?;
         dict.set_item("query_most_bytes", done.queried.most_bytes)?;
         dict.set_item("device", done.device.as_deref())?;
+        if let Some(traffic) = remote::traffic(&self.options.path) {
+            dict.set_item("remote", told(py, &traffic)?)?;
+        }
         Ok(dict)
     }
 

@@ -25,6 +25,9 @@ from ._picture import Picture
 #: The triangle of a ray that hits nothing.
 INVALID_ID = 0xFFFFFFFF
 
+#: What is no path of a file.
+URLS = ("s3://", "gs://", "az://", "http://", "https://")
+
 Progress = Callable[[int, int], Any]
 
 # What is known of a point on a triangle: dtypes, and shapes beside those of the rays or points.
@@ -53,27 +56,40 @@ class Scene:
     in lengths of the direction that was given.
     """
 
-    def __init__(self, *, _core: _brickwalk.Core, _options: tuple[str, str, str], _folder: str | None = None):
+    def __init__(self, *, _core: _brickwalk.Core, _options: tuple[Any, ...], _folder: str | None = None):
         self._core, self._options = _core, _options
         # A forked process does not remove what its parent uses.
         self._remove = _folder and weakref.finalize(self, _remove, _folder, os.getpid())
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], cache: str | int = "2G", adapter: str = "auto") -> Scene:
-        """Opens a scene file. Only its resident part is read; a device is opened by the first picture.
+    def open(
+        cls,
+        path: str | os.PathLike[str],
+        cache: str | int = "2G",
+        adapter: str = "auto",
+        *,
+        disk_cache: str | None = None,
+    ) -> Scene:
+        """Opens a scene file, or the URL of one: ``s3://``, ``gs://``, ``az://``, ``http://``, ``https://``. Only its resident part is read; a device is opened by the first picture.
 
         ``cache`` is the memory for bricks: a size as "2G", a share as "25%", bytes, or "auto". Queries take it in host
         memory, pictures as much again on their device. ``adapter``, which renders pictures, is "auto", "cpu", or a part
-        of the name of a graphics adapter.
+        of the name of a graphics adapter. ``disk_cache`` keeps parts of a scene by URL: "DIR,SIZE". Credentials come
+        from the environment, see docs/remote.md.
 
         Raises FileNotFoundError, ValueError for a cache that is none or a model that is not converted, BrickwalkError
         for a file that is damaged.
         """
-        name = os.path.abspath(os.fsdecode(os.fspath(path)))
+        text = os.fsdecode(os.fspath(path))
+        disk = None if disk_cache is None else _text("disk_cache", disk_cache)
+        if text.lower().startswith(URLS):
+            options = (text, _size(cache), _text("adapter", adapter), disk)
+            return cls(_core=_brickwalk.Core(*options), _options=options)
+        name = os.path.abspath(text)
         is_model = name.lower().endswith(MODELS) or os.path.basename(name) == "tileset.json"
         if is_model and os.path.exists(name):
             raise ValueError(f"{name}: this is a model; make a scene file of it by brickwalk.convert")
-        options = (name, _size(cache), _text("adapter", adapter))
+        options = (name, _size(cache), _text("adapter", adapter), disk)
         return cls(_core=_brickwalk.Core(*options), _options=options)
 
     @classmethod
@@ -137,7 +153,8 @@ class Scene:
 
     def __repr__(self) -> str:
         state = "closed" if self.closed else f"{self._core.info()['triangles']} triangles"
-        return f"<brickwalk.Scene {self._options[0]!r}, {state}>"
+        # Of a URL without what is secret.
+        return f"<brickwalk.Scene {self._core.info()['path']!r}, {state}>"
 
     def _check(self) -> _brickwalk.Core:
         if self._core.closed:
@@ -395,8 +412,8 @@ def _one(name: str, out: np.ndarray | None) -> dict[str, np.ndarray] | None:
     return None if out is None else {name: out}
 
 
-def _reopen(path: str, cache: str, adapter: str) -> Scene:
-    return Scene.open(path, cache, adapter)
+def _reopen(path: str, cache: str, adapter: str, disk_cache: str | None = None) -> Scene:
+    return Scene.open(path, cache, adapter, disk_cache=disk_cache)
 
 
 def _remove(folder: str, process: int) -> None:

@@ -1,0 +1,128 @@
+"""Scenes from a bucket, which a server on this machine plays: the same answers as from the file."""
+
+import os
+import pickle
+import subprocess
+import sys
+import time
+import urllib.request
+
+import numpy as np
+import pytest
+
+import brickwalk
+import meshes
+
+KEYS = {
+    "AWS_ACCESS_KEY_ID": "nobody",
+    "AWS_SECRET_ACCESS_KEY": "5ec2e7",
+    "AWS_REGION": "us-east-1",
+    "AWS_ALLOW_HTTP": "true",
+}
+
+# Serves until its input ends, and says at which port.
+SERVER = """
+import sys
+from moto.server import ThreadedMotoServer
+server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+server.start()
+print(server.get_host_and_port()[1], flush=True)
+sys.stdin.read()
+server.stop()
+"""
+
+
+def put(url, body=b""):
+    request = urllib.request.Request(url, data=body, method="PUT")
+    request.add_header("Authorization", "AWS4-HMAC-SHA256 Credential=nobody/20260101/us-east-1/s3/aws4_request")
+    with urllib.request.urlopen(request, timeout=30) as answer:
+        assert answer.status == 200
+
+
+@pytest.fixture(scope="module")
+def bucket(tmp_path_factory):
+    """A scene file, and its URL."""
+    pytest.importorskip("moto.server")
+    file = tmp_path_factory.mktemp("scene") / "a.bricks"
+    vertices, faces = meshes.soup(4000)
+    with brickwalk.Scene.from_arrays(vertices, faces, brick_triangles=64) as scene:
+        file.write_bytes(open(scene.info["path"], "rb").read())
+    with subprocess.Popen([sys.executable, "-c", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
+        try:
+            endpoint = f"http://127.0.0.1:{int(server.stdout.readline())}"
+            put(f"{endpoint}/bucket")
+            put(f"{endpoint}/bucket/scenes/a.bricks", file.read_bytes())
+            with pytest.MonkeyPatch.context() as patch:
+                for name, value in {**KEYS, "AWS_ENDPOINT": endpoint}.items():
+                    patch.setenv(name, value)
+                yield file, "s3://bucket/scenes/a.bricks"
+        finally:
+            server.stdin.close()
+            server.wait(timeout=30)
+
+
+def rays():
+    rng = np.random.default_rng(1)
+    return np.concatenate([rng.uniform(-2, 2, (5000, 3)), rng.normal(size=(5000, 3))], axis=1)
+
+
+def test_answers_are_those_of_the_file(bucket):
+    file, url = bucket
+    with brickwalk.Scene.open(file, adapter="cpu") as local, brickwalk.Scene.open(url, adapter="cpu") as remote:
+        assert remote.stats()["remote"]["requests"] == 2
+        assert "remote" not in local.stats()
+        expected, found = local.cast_rays(rays()), remote.cast_rays(rays())
+        assert np.isfinite(expected["t"]).sum() > 100
+        for name in expected:
+            np.testing.assert_array_equal(found[name], expected[name])
+        points = np.random.default_rng(2).uniform(-2, 2, (500, 3))
+        np.testing.assert_array_equal(remote.distance(points), local.distance(points))
+        picture = [scene.render(brickwalk.Camera(position=(0, 0, 5)), size="32x24") for scene in (local, remote)]
+        np.testing.assert_array_equal(picture[0].radiance, picture[1].radiance)
+        stats = remote.stats()["remote"]
+        assert stats["bytes_fetched"] <= 1.05 * stats["bytes_needed"] and stats["retries"] == 0
+        assert "a.bricks" in repr(remote) and remote.info["path"] == url
+        with pickle.loads(pickle.dumps(remote)) as copy:
+            np.testing.assert_array_equal(copy.cast_rays(rays())["t"], expected["t"])
+
+
+def test_a_disk_cache_saves_all_but_the_head(bucket, tmp_path):
+    file, url = bucket
+    cache = f"{tmp_path},64M"
+    with brickwalk.Scene.open(url, disk_cache=cache) as first:
+        expected = first.cast_rays(rays())
+        requests = first.stats()["remote"]["requests"]
+    with brickwalk.Scene.open(url, disk_cache=cache) as second:
+        np.testing.assert_array_equal(second.cast_rays(rays())["t"], expected["t"])
+        stats = second.stats()["remote"]
+        assert stats["requests"] == requests + 1 and stats["disk_cache_hits"] > 10
+    with pytest.raises(ValueError, match="disk_cache"):
+        brickwalk.Scene.open(url, disk_cache="nothing")
+
+
+def test_a_forked_process_fetches_for_itself(bucket):
+    _, url = bucket
+    if not hasattr(os, "fork"):
+        pytest.skip("this system has no fork")
+    with brickwalk.Scene.open(url) as scene:
+        expected = scene.cast_rays(rays()[:100])["t"]
+        child = os.fork()
+        if child == 0:
+            same = np.array_equal(scene.cast_rays(rays()[:100])["t"], expected)
+            os._exit(0 if same else 1)
+        deadline = time.monotonic() + 60
+        while (done := os.waitpid(child, os.WNOHANG))[0] == 0 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        if done[0] == 0:
+            os.kill(child, 9)
+            os.waitpid(child, 0)
+        assert done == (child, 0)
+
+
+def test_what_is_wrong_is_named_without_secrets(bucket, monkeypatch):
+    _, url = bucket
+    with pytest.raises(brickwalk.BrickwalkError, match="there is no such object"):
+        brickwalk.Scene.open(url + ".missing")
+    with pytest.raises(brickwalk.BrickwalkError, match="no connection") as error:
+        brickwalk.Scene.open("http://ann:5ec2e7@127.0.0.1:9/a.bricks?sig=5ec2e7")
+    assert "5ec2e7" not in str(error.value) and "127.0.0.1" in str(error.value)
