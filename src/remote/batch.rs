@@ -56,8 +56,8 @@ mod tests {
         assert_eq!(ranges(&[kib(4, 200), kib(200, 400), kib(404, 600)]), [kib(4, 600)]);
         assert_eq!(ranges(&[kib(4, 200), kib(300, 400)]), [kib(4, 200), kib(300, 400)]);
         // The smallest gaps are taken while they are a small share.
-        let spans = [kib(0, 60), kib(64, 124), kib(125, 185)];
-        assert_eq!(ranges(&spans), [kib(0, 60), kib(64, 185)]);
+        let spans = [kib(0, 60), kib(65, 125), kib(126, 186)];
+        assert_eq!(ranges(&spans), [kib(0, 60), kib(65, 186)]);
         // Long ranges go over several connections.
         assert_eq!(ranges(&[kib(0, 9000), kib(9000, 9100)]).len(), 2);
     }

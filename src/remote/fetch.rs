@@ -49,7 +49,7 @@ impl Default for Limits {
             retry_time: seconds(60),
             first_pause: Duration::from_millis(100),
             longest_pause: seconds(10),
-            tries: 4,
+            tries: 6,
             patience: seconds(600),
             requests: 64,
             batch_bytes: 128 << 20,
@@ -236,7 +236,7 @@ fn trouble(error: &Error, note: &Note) -> Trouble {
                 Trouble::Passing(failure(ErrorKind::Other, &text))
             }
             None => {
-                let text = "the store could not be asked; check the credentials in the environment, see docs/remote.md";
+                let text = "no answer that is of use; check URL and credentials, see docs/remote.md";
                 fatal(ErrorKind::Other, text)
             }
         },

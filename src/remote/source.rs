@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// How often bytes that do not fit their checksum are fetched again.
-const MOST_DISTRUSTED: u32 = 3;
+const MOST_DISTRUSTED: u32 = 5;
 
 /// An object that is read as a scene file.
 struct RemoteSource {

@@ -27,7 +27,7 @@ impl View for OfStudy {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct StudyCommand {
-    /// The scene
+    /// The scene, or the URL of one
     #[arg(value_name = "S.bricks", value_parser = scene_name())]
     scene: PathBuf,
     /// Folder for the results. Started again with the same folder and settings, a study goes on where it stopped

@@ -356,7 +356,7 @@ impl SceneArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct InfoArgs {
-    /// The scene: a .bricks file, or a model
+    /// The scene: a .bricks file, the URL of one, or a model
     ///
     /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
     /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
@@ -382,7 +382,7 @@ pub struct InfoArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct VerifyArgs {
-    /// The scene
+    /// The scene, or the URL of one
     #[arg(value_name = "S.bricks", value_parser = scene_name())]
     pub scene: PathBuf,
 }
@@ -450,7 +450,7 @@ fn one_of<const A: u32, const B: u32, const C: u32, const D: u32>(text: &str) ->
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct WalkArgs {
-    /// The scene: a .bricks file, or a model
+    /// The scene: a .bricks file, the URL of one, or a model
     ///
     /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
     /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else
@@ -531,8 +531,8 @@ impl ViewSettings {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct ViewArgs {
-    /// The scene: a .bricks file, or a model, which is converted first, as by `walk`. [default: none; drop one on the
-    /// window]
+    /// The scene: a .bricks file, the URL of one, or a model, which is converted first, as by `walk`. [default: none;
+    /// drop one on the window]
     #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: Option<PathBuf>,
     /// Folder for screenshots and paths [default: the current one]
@@ -548,7 +548,7 @@ pub struct ViewArgs {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct ServeArgs {
-    /// The scene: a .bricks file, or a model, which is converted first, as by `walk`
+    /// The scene: a .bricks file, the URL of one, or a model, which is converted first, as by `walk`
     #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: PathBuf,
     /// Port to listen on; 0: any that is free
@@ -578,7 +578,7 @@ fn usage(error: SettingsError) -> anyhow::Error {
 #[derive(Clone, Debug, Args)]
 #[command(after_help = UNITS)]
 pub struct TraceArgs {
-    /// The scene: a .bricks file, or a model
+    /// The scene: a .bricks file, the URL of one, or a model
     ///
     /// A model (.gltf, .glb, .obj, .ply, .stl, tileset.json) is converted once into a folder and taken from there the
     /// next time, as long as its files are the same; a line says where it is. The folder is BRICKWALK_CACHE_DIR, else

@@ -43,7 +43,7 @@ pub struct QueryArgs {
     /// What is asked
     #[arg(value_name = "KIND")]
     pub kind: Kind,
-    /// The scene: a .bricks file, or a model, which is converted first, as by `trace`
+    /// The scene: a .bricks file, the URL of one, or a model, which is converted first, as by `trace`
     #[arg(value_name = "S.bricks|MODEL", value_parser = scene_name())]
     pub scene: PathBuf,
     /// Rays or points: a NumPy array, world space

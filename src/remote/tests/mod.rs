@@ -139,18 +139,18 @@ fn faults_are_survived() {
     let expected = bits(&cast(&local(&SMALL)).unwrap());
     for way in [Fault::Busy, Fault::Silence, Fault::Cut, Fault::Flip] {
         for has_etag in [true, false] {
-            let ways: &[Fault] = match way {
-                Fault::Busy => &[Fault::Busy],
-                Fault::Silence => &[Fault::Silence],
-                Fault::Cut => &[Fault::Cut],
-                Fault::Flip => &[Fault::Flip],
+            let (ways, faults): (&[Fault], f64) = match way {
+                Fault::Busy => (&[Fault::Busy], 0.2),
+                Fault::Silence => (&[Fault::Silence], 0.1),
+                Fault::Cut => (&[Fault::Cut], 0.1),
+                Fault::Flip => (&[Fault::Flip], 0.1),
             };
-            let server = Server::new(SMALL.clone(), Manner { faults: 0.2, ways, has_etag, ..Manner::default() });
+            let server = Server::new(SMALL.clone(), Manner { faults, ways, has_etag, ..Manner::default() });
             let scene = open(&server, None).unwrap();
             assert_eq!(bits(&cast(&scene).unwrap()), expected, "{way:?}");
             // So that some happen.
             let mut bytes = Vec::new();
-            for brick in 0..30 {
+            for brick in 0..20 {
                 bytes.resize(scene.loaded_bytes(Payload::Geometry(brick)) as usize, 0);
                 scene.copy(Payload::Geometry(brick), &mut bytes).unwrap();
             }
@@ -244,7 +244,7 @@ fn wrong_bytes_do_not_stay_in_the_disk_cache() {
     let disk = DiskCache { folder: folder.path().into(), bytes: 64 << 20 };
     let expected = bits(&cast(&local(&SMALL)).unwrap());
     let ways = &[Fault::Flip];
-    let server = Server::new(SMALL.clone(), Manner { faults: 0.3, ways, ..Manner::default() });
+    let server = Server::new(SMALL.clone(), Manner { faults: 0.1, ways, ..Manner::default() });
     for _ in 0..3 {
         assert_eq!(bits(&cast(&open(&server, Some(&disk)).unwrap()).unwrap()), expected);
     }

@@ -163,8 +163,8 @@ impl Shared {
         if self.manner.has_etag {
             head += &format!("ETag: {etag}\r\n");
         }
-        let day = if is_new { 2 } else { 1 };
-        head += &format!("Last-Modified: Thu, 0{day} Jan 2026 00:00:00 GMT\r\n\r\n");
+        let day = if is_new { "Fri, 02" } else { "Thu, 01" };
+        head += &format!("Last-Modified: {day} Jan 2026 00:00:00 GMT\r\n\r\n");
         stream.write_all(head.as_bytes()).ok()?;
         let mut body = self.object[start..end].to_vec();
         if is_new || fault == Some(Fault::Flip) {
