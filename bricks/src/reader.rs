@@ -123,7 +123,8 @@ impl Reader<'_> {
 
     /// Announces what follows the payloads.
     pub(crate) fn announce_resident(&self, header: &Header) {
-        self.source.announce(&[header.directory_offset..header.file_bytes]);
+        let resident = header.directory_offset..header.file_bytes;
+        self.source.announce(std::slice::from_ref(&resident));
     }
 
     /// Reads the header of a file of `length` bytes. Nothing in it is used before its checksum is found right, except

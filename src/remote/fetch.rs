@@ -94,6 +94,9 @@ pub(super) struct Live {
     counters: Arc<Counters>,
 }
 
+/// The bytes of a range and the version that they are of.
+type Answer = Result<(Bytes, Pin), Failure>;
+
 /// Threads that carry what arrives.
 const THREADS: usize = 2;
 
@@ -131,11 +134,7 @@ impl Drop for Live {
 }
 
 /// Fetches ranges of the version `pin`, or of whichever there is, and waits for all.
-pub(super) fn fetch(
-    live: &Arc<Live>,
-    ranges: &[Range<u64>],
-    pin: Option<&Pin>,
-) -> Vec<(Range<u64>, Result<(Bytes, Pin), Failure>)> {
+pub(super) fn fetch(live: &Arc<Live>, ranges: &[Range<u64>], pin: Option<&Pin>) -> Vec<(Range<u64>, Answer)> {
     let start = Instant::now();
     let (sender, receiver) = mpsc::channel();
     for range in ranges {
@@ -169,7 +168,7 @@ enum Trouble {
 }
 
 /// Fetches a range, in several tries if need be.
-async fn one(live: &Live, range: &Range<u64>, pin: Option<&Pin>) -> Result<(Bytes, Pin), Failure> {
+async fn one(live: &Live, range: &Range<u64>, pin: Option<&Pin>) -> Answer {
     let note = Note::default();
     let mut pause = live.limits.first_pause;
     for _ in 1..live.limits.tries {
