@@ -79,8 +79,9 @@ impl RemoteSource {
         Ok(live.clone())
     }
 
-    /// Brings spans, which ascend and do not overlap, each with the bytes that will be read of it.
-    fn bring(&self, spans: &[(Range<u64>, u64)]) {
+    /// Spans, which ascend and do not overlap, each with the bytes that will be read of it: from the disk cache, or
+    /// fetched together.
+    fn bring(&self, spans: &[(Range<u64>, u64)]) -> Vec<(Range<u64>, u64, Result<Bytes, Failure>)> {
         let counters = &self.place.counters;
         let from_disk = |(span, left): &(Range<u64>, u64)| {
             let bytes = self.entries.as_ref().and_then(|entries| entries.get(span.start, span.end));
@@ -113,7 +114,7 @@ impl RemoteSource {
             }
             batch.extend(fetched);
         }
-        lock(&self.held).insert(batch, 2 * self.limits.batch_bytes);
+        batch
     }
 
     /// Fetches spans, joined to ranges.
@@ -153,14 +154,11 @@ impl ByteSource for RemoteSource {
             return Err(ErrorKind::UnexpectedEof.into());
         }
         let held = lock(&self.held).take(&range);
-        let bytes = match held {
-            Some(bytes) => bytes,
-            None => {
-                self.bring(&[(range.clone(), out.len() as u64)]);
-                let gone = || Err(Failure { kind: ErrorKind::Other, text: "read by another thread; try again".into() });
-                lock(&self.held).take(&range).unwrap_or_else(gone)
-            }
-        };
+        let bytes = held.unwrap_or_else(|| {
+            let missing = || Failure { kind: ErrorKind::Other, text: "the request was not made; try again".into() };
+            let brought = self.bring(&[(range, out.len() as u64)]).pop();
+            brought.map_or_else(|| Err(missing()), |(_, _, bytes)| bytes)
+        });
         out.copy_from_slice(&bytes?);
         Ok(())
     }
@@ -197,7 +195,8 @@ impl ByteSource for RemoteSource {
             }
         }
         if !spans.is_empty() {
-            self.bring(&spans);
+            let batch = self.bring(&spans);
+            lock(&self.held).insert(batch, 2 * self.limits.batch_bytes);
         }
     }
 
