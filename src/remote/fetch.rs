@@ -2,7 +2,7 @@
 
 use super::held::Failure;
 use super::names::Place;
-use super::store::{NO_RANGES, Note, Object};
+use super::store::{ANSWERED, NO_CONNECTION, NO_RANGES, Note, Object};
 use super::traffic::{Counters, add};
 use anyhow::{Context, Result};
 use bytes::Bytes;
@@ -45,10 +45,10 @@ impl Default for Limits {
         Self {
             connect: seconds(5),
             silence: seconds(20),
-            retries: 8,
-            retry_time: seconds(60),
+            retries: 6,
+            retry_time: seconds(40),
             first_pause: Duration::from_millis(100),
-            longest_pause: seconds(10),
+            longest_pause: seconds(5),
             tries: 6,
             patience: seconds(600),
             requests: 64,
@@ -171,8 +171,11 @@ enum Trouble {
 async fn one(live: &Live, range: &Range<u64>, pin: Option<&Pin>) -> Answer {
     let note = Note::default();
     let mut pause = live.limits.first_pause;
+    let start = Instant::now();
     for _ in 1..live.limits.tries {
         match attempt(live, range, pin, &note).await {
+            // The store repeats requests, too.
+            Err(Trouble::Passing(failure)) if start.elapsed() > live.limits.retry_time => return Err(failure),
             Err(Trouble::Passing(failure)) => {
                 tracing::info!("bytes {} to {}: {}; trying again", range.start, range.end, failure.text);
                 tokio::time::sleep(pause).await;
@@ -231,8 +234,10 @@ fn trouble(error: &Error, note: &Note) -> Trouble {
                 fatal(ErrorKind::Unsupported, &format!("{NO_RANGES}; download the scene, or use another server"))
             }
             Some(told) => {
-                let text = format!("{told}; check the URL and the network, or try again later");
-                Trouble::Passing(failure(ErrorKind::Other, &text))
+                let failure = failure(ErrorKind::Other, &format!("{told}; check URL and network, or try again later"));
+                // The store has repeated these by itself.
+                let is_final = told.starts_with(ANSWERED) || told == NO_CONNECTION;
+                if is_final { Trouble::Fatal(failure) } else { Trouble::Passing(failure) }
             }
             None => {
                 let text = "no answer that is of use; check URL and credentials, see docs/remote.md";

@@ -66,10 +66,15 @@ impl Note {
 /// Said of a server that answers a request for a range with all of an object.
 pub(super) const NO_RANGES: &str = "the server does not answer range requests";
 
+/// Begins what is said of a request that a server refused.
+pub(super) const ANSWERED: &str = "the server answered";
+/// Said where no server is reached.
+pub(super) const NO_CONNECTION: &str = "there is no connection";
+
 /// What is said of a failed request; nothing of it is secret.
 fn said(error: &HttpError) -> String {
     match error.kind() {
-        HttpErrorKind::Connect => "there is no connection".into(),
+        HttpErrorKind::Connect => NO_CONNECTION.into(),
         HttpErrorKind::Timeout => "the answer took too long".into(),
         HttpErrorKind::Interrupted | HttpErrorKind::Request | HttpErrorKind::Decode => "the answer was cut off".into(),
         _ => "the request failed".into(),
@@ -94,7 +99,7 @@ impl HttpService for Counting {
         let (parts, body) = response.into_parts();
         match parts.status {
             StatusCode::OK if is_range => note.set(NO_RANGES.into()),
-            status if !status.is_success() => note.set(format!("the server answered {status}")),
+            status if !status.is_success() => note.set(format!("{ANSWERED} {status}")),
             _ => {}
         }
         let counters = self.counters.clone();

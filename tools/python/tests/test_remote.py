@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 import time
@@ -35,6 +36,7 @@ server.stop()
 def put(url, body=b""):
     request = urllib.request.Request(url, data=body, method="PUT")
     request.add_header("Authorization", "AWS4-HMAC-SHA256 Credential=nobody/20260101/us-east-1/s3/aws4_request")
+    request.add_header("Content-Type", "application/octet-stream")
     with urllib.request.urlopen(request, timeout=30) as answer:
         assert answer.status == 200
 
@@ -46,7 +48,7 @@ def bucket(tmp_path_factory):
     file = tmp_path_factory.mktemp("scene") / "a.bricks"
     vertices, faces = meshes.soup(4000)
     with brickwalk.Scene.from_arrays(vertices, faces, brick_triangles=64) as scene:
-        file.write_bytes(open(scene.info["path"], "rb").read())
+        shutil.copy(scene.info["path"], file)
     with subprocess.Popen([sys.executable, "-c", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
         try:
             endpoint = f"http://127.0.0.1:{int(server.stdout.readline())}"
@@ -77,8 +79,9 @@ def test_answers_are_those_of_the_file(bucket):
             np.testing.assert_array_equal(found[name], expected[name])
         points = np.random.default_rng(2).uniform(-2, 2, (500, 3))
         np.testing.assert_array_equal(remote.distance(points), local.distance(points))
-        picture = [scene.render(brickwalk.Camera(position=(0, 0, 5)), size="32x24") for scene in (local, remote)]
-        np.testing.assert_array_equal(picture[0].radiance, picture[1].radiance)
+        camera = brickwalk.Camera(position=(0, 0, 5), target=(0, 0, 0))
+        picture = [scene.render(camera, size="32x24") for scene in (local, remote)]
+        np.testing.assert_array_equal(picture[0]["radiance"], picture[1]["radiance"])
         stats = remote.stats()["remote"]
         assert stats["bytes_fetched"] <= 1.05 * stats["bytes_needed"] and stats["retries"] == 0
         assert "a.bricks" in repr(remote) and remote.info["path"] == url
