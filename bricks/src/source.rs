@@ -29,8 +29,8 @@ pub trait ByteSource: Send + Sync {
         None
     }
 
-    /// Says that the bytes of a span are not those that its checksum is of, and were not so many `times` before. Whether
-    /// reading it once more may bring others.
+    /// Says that the bytes of a span are not those that its checksum is of, and were not so many `times` before.
+    /// Whether reading it once more may bring others.
     fn distrust(&self, _span: Range<u64>, _times: u32) -> bool {
         false
     }
