@@ -210,12 +210,12 @@ impl Lines {
         lines
     }
 
-    /// Which lines certainly do not meet the triangle, a bit each: those that [`surely_meets`] denies.
+    /// Which lines certainly do not meet the triangle, a bit each, as decided for a line alone.
     #[inline(always)]
     pub fn surely_miss(&self, [a, b, c]: [DVec3; 3]) -> u32 {
         let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
         let mut misses = [0; 8];
-        for i in 0..8 {
+        for (i, miss) in misses.iter_mut().enumerate() {
             let [ox, oy, oz] = [self.origin[0][i], self.origin[1][i], self.origin[2][i]];
             let [dx, dy, dz] = [self.direction[0][i], self.direction[1][i], self.direction[2][i]];
             let (ax, ay, az) = (a.x - ox, a.y - oy, a.z - oz);
@@ -228,7 +228,7 @@ impl Lines {
             let error = TRIPLE_ERROR * 2.0 * most * most * self.length[i] + UNDERFLOW;
             let is_above = (u > error) | (v > error) | (w > error);
             let is_below = (u < -error) | (v < -error) | (w < -error);
-            misses[i] = u64::from(is_above & is_below);
+            *miss = u64::from(is_above & is_below);
         }
         (0..8).fold(0, |mask, i| mask | (misses[i] as u32) << i)
     }
