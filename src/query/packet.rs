@@ -5,6 +5,7 @@
 //! walk waits for most, memory and branches that turn out otherwise, is there once for eight.
 
 use super::aim::{Aim, Local};
+use super::room::Joint;
 use super::space::{Geometry, Placed};
 use super::top::Top;
 use super::walk::{Open, child, elements};
@@ -67,9 +68,6 @@ macro_rules! eight {
         ]
     };
 }
-
-/// What is left to be visited, and the rays to whom it may matter, a bit each.
-pub(super) type Joint = (Open, u32);
 
 /// Rays on their way together.
 pub(super) struct Packet {
@@ -140,8 +138,8 @@ impl Packet {
         eight!(i => locals.one.above(self.aims[i].limit(t[i])))
     }
 
-    /// Calls `visit` for the leaves of the top level that rays may enter up to `t`, with where at the earliest and which
-    /// rays; and up to what it returns. As [`Aim::leaves`].
+    /// Calls `visit` for the leaves of the top level that rays may enter up to `t`, with where at the earliest, and
+    /// which rays; and up to what it returns. As [`Aim::leaves`].
     #[inline(always)]
     pub(super) fn leaves<I: Isa>(
         &self,

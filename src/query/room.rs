@@ -1,7 +1,9 @@
 //! Room for walks: what is left to be visited.
 
-use super::packet::Joint;
 use super::walk::Open;
+
+/// What is left to be visited by rays that go together, and to whom of them it may matter, a bit each.
+pub(super) type Joint = (Open, u32);
 
 /// Room for walks.
 #[derive(Default)]

@@ -70,7 +70,9 @@ class Scene:
         *,
         disk_cache: str | None = None,
     ) -> Scene:
-        """Opens a scene file, or the URL of one: ``s3://``, ``gs://``, ``az://``, ``http://``, ``https://``. Only its resident part is read; a device is opened by the first picture.
+        """Opens a scene file, or the URL of one: ``s3://``, ``gs://``, ``az://``, ``http://``, ``https://``.
+
+        Only its resident part is read; a device is opened by the first picture.
 
         ``cache`` is the memory for bricks: a size as "2G", a share as "25%", bytes, or "auto". Queries take it in host
         memory, pictures as much again on their device. ``adapter``, which renders pictures, is "auto", "cpu", or a part
