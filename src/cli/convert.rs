@@ -4,6 +4,7 @@ use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
 use super::{bake_displacement, interrupt};
 use crate::cli::output::{Usage, note, one_line, warn};
 use crate::output::atomic;
+use crate::remote;
 use crate::settings::Adapter;
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
@@ -193,10 +194,11 @@ pub fn summarise(
 /// sorted bytewise by path.
 ///
 /// # Errors
-/// A folder cannot be read, or holds no scene file.
+/// A folder cannot be read, or holds no scene file; an input is a URL.
 pub fn expand(inputs: &[Input]) -> Result<Vec<Input>> {
     let mut files = Vec::new();
     for input in inputs {
+        remote::refuse(&input.path, "a conversion")?;
         if !input.path.is_dir() {
             files.push(input.clone());
             continue;

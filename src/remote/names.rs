@@ -92,7 +92,7 @@ pub fn traffic(path: &Path) -> Option<Traffic> {
 /// `path` is a URL.
 pub fn refuse(path: &Path, what: &str) -> Result<()> {
     if is_url(path) {
-        bail!("{}: {what} needs a file of this machine; download the scene", name(path).display());
+        bail!("{}: {what} needs a file of this machine; download it", name(path).display());
     }
     Ok(())
 }

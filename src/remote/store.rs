@@ -159,31 +159,20 @@ impl Object {
         let path = || Path::from_url_path(url.path()).context("the URL's path is none of an object");
         // What the crate says of settings may repeat them.
         let wrong = "the settings of the store in the environment do not go together; see docs/remote.md";
+        // Builders of stores have no trait in common.
+        macro_rules! in_bucket {
+            ($builder:expr, $key:path) => {{
+                let builder = $builder.with_retry(retry).with_http_connector(connector);
+                let builder =
+                    client.into_iter().fold(builder, |builder, (key, value)| builder.with_config($key(key), value));
+                let store = builder.build().map_err(|_| anyhow::anyhow!(wrong))?;
+                Self { store: Arc::new(store), path: path()? }
+            }};
+        }
         Ok(match url.scheme() {
-            "s3" => {
-                let builder = AmazonS3Builder::from_env().with_bucket_name(host).with_retry(retry);
-                let builder = client
-                    .into_iter()
-                    .fold(builder, |builder, (key, value)| builder.with_config(AmazonS3ConfigKey::Client(key), value));
-                let store = builder.with_http_connector(connector).build().map_err(|_| anyhow::anyhow!(wrong))?;
-                Self { store: Arc::new(store), path: path()? }
-            }
-            "gs" => {
-                let builder = GoogleCloudStorageBuilder::from_env().with_bucket_name(host).with_retry(retry);
-                let builder = client
-                    .into_iter()
-                    .fold(builder, |builder, (key, value)| builder.with_config(GoogleConfigKey::Client(key), value));
-                let store = builder.with_http_connector(connector).build().map_err(|_| anyhow::anyhow!(wrong))?;
-                Self { store: Arc::new(store), path: path()? }
-            }
-            "az" => {
-                let builder = MicrosoftAzureBuilder::from_env().with_container_name(host).with_retry(retry);
-                let builder = client
-                    .into_iter()
-                    .fold(builder, |builder, (key, value)| builder.with_config(AzureConfigKey::Client(key), value));
-                let store = builder.with_http_connector(connector).build().map_err(|_| anyhow::anyhow!(wrong))?;
-                Self { store: Arc::new(store), path: path()? }
-            }
+            "s3" => in_bucket!(AmazonS3Builder::from_env().with_bucket_name(host), AmazonS3ConfigKey::Client),
+            "gs" => in_bucket!(GoogleCloudStorageBuilder::from_env().with_bucket_name(host), GoogleConfigKey::Client),
+            "az" => in_bucket!(MicrosoftAzureBuilder::from_env().with_container_name(host), AzureConfigKey::Client),
             "http" | "https" => {
                 let is_plain = url.scheme() == "http";
                 let options = ClientOptions::new().with_allow_http(is_plain).with_no_system_certificates(is_plain);
