@@ -69,6 +69,16 @@ macro_rules! counters {
                 $(counters! { @entry self map $column $sum [$($unwritten)?] })*
                 Ok(())
             }
+
+            /// Those of a record, as [`Counters::write`] wrote it; `None` where a value is of another type. Of sets it
+            /// is known how many are in them.
+            pub(super) fn read(record: &Map<String, Value>) -> Option<Self> {
+                let mut counters = Self::default();
+                $(if let Some(value) = record.get(stringify!($name)) {
+                    counters.$name = counters! { @read_one $type value }?;
+                })*
+                Some(counters)
+            }
         }
 
         /// The fields of records, in their order, behind `frame` and `pass`.
@@ -121,6 +131,11 @@ macro_rules! counters {
     (@entry $self:ident $map:ident $name:ident $sum:ident []) => {
         $map.serialize_entry(stringify!($name), &$self.$name)?;
     };
+    (@read_one u64 $value:ident) => { $value.as_u64() };
+    // What is no number is written as null.
+    (@read_one f64 $value:ident) => { if $value.is_null() { Some(f64::NAN) } else { $value.as_f64() } };
+    (@read_one Bricks $value:ident) => { $value.as_u64().map(Bricks::of_count) };
+    (@read_one Names $value:ident) => { $value.as_str().map(Names::of_text) };
     (@named $name:ident $word:ident) => { stringify!($name) };
     (@float f64) => { true };
     (@float $other:ident) => { false };

@@ -11,8 +11,11 @@ pub(crate) use table::device_words;
 pub use table::{COLUMNS, Counters};
 
 use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde_json::Value;
+use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::{Deref, DerefMut};
+use std::sync::{Mutex, PoisonError};
 
 /// A field of records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +112,11 @@ impl Bricks {
         self.count.max(self.distinct().len() as u64)
     }
 
+    /// So many, of which it is not known which.
+    fn of_count(count: u64) -> Self {
+        Self { numbers: Vec::new(), count, is_known: true }
+    }
+
     /// Keeps how many there are, and forgets which.
     fn forget(&mut self) {
         self.count = self.count();
@@ -128,10 +136,27 @@ impl Names {
         }
     }
 
+    /// Those of a text that they were written as.
+    fn of_text(text: &str) -> Self {
+        Self(text.split('+').filter(|name| !name.is_empty()).map(kept).collect())
+    }
+
     /// Adds those of more work.
     pub fn add(&mut self, other: &Self) {
         other.0.iter().for_each(|name| self.push(name));
     }
+}
+
+/// A name that was read, for as long as the process lives: there are few of them.
+fn kept(name: &str) -> &'static str {
+    static NAMES: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+    let mut names = NAMES.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = names.get(name) {
+        return known;
+    }
+    let name: &'static str = String::leak(name.to_owned());
+    names.insert(name);
+    name
 }
 
 impl fmt::Display for Names {
@@ -178,6 +203,13 @@ impl Record {
         Self { frame, pass, counters }
     }
 
+    /// A line of `records.jsonl`; `None`: it is none.
+    pub fn read(line: &Value) -> Option<Self> {
+        let record = line.as_object()?;
+        let frame = record.get("frame")?.as_u64()?.try_into().ok()?;
+        Some(Self { frame, pass: kept(record.get("pass")?.as_str()?), counters: Counters::read(record)? })
+    }
+
     /// Bytes that were loaded: bricks, attributes, textures.
     pub fn loaded_bytes(&self) -> u64 {
         self.bytes_bvh + self.bytes_geometry + self.bytes_attributes + self.bytes_textures
@@ -221,6 +253,20 @@ mod tests {
         for column in COLUMNS.iter().filter(|column| column.is_written) {
             assert_eq!(value[column.name].is_f64(), column.is_float, "{}", column.name);
         }
+    }
+
+    #[test]
+    fn records_come_back_as_they_were_written() {
+        let mut counters = Counters { rays_traced: 7, ms: 0.1 + 0.2, cache_passes: 3, ..Counters::default() };
+        counters.bricks_hit.extend([4, 1, 4]);
+        ["chc", "demand"].into_iter().for_each(|name| counters.schedule.push(name));
+        let written = serde_json::to_value(Record::of(3, "ao", counters)).expect("a record");
+        let read = Record::read(&written).expect("a record");
+        assert_eq!((read.frame, read.pass, read.rays_traced, read.ms), (3, "ao", 7, 0.1 + 0.2));
+        assert_eq!(serde_json::to_value(read).expect("a record"), written);
+        let mut other = written;
+        other["rays_traced"] = "7".into();
+        assert_eq!(Record::read(&other), None);
     }
 
     #[test]

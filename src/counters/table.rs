@@ -3,6 +3,7 @@
 use super::declare::counters;
 use super::{Bricks, Column, Kind, Names, Source};
 use serde::ser::SerializeMap;
+use serde_json::{Map, Value};
 
 counters! {
     /// Schedules that the effect's passes were traced by, with `+` between them, the first used first: `chc`, `demand`,
