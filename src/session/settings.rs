@@ -9,7 +9,7 @@ use crate::schedule::{Optimisation, Optimisations, PartOf};
 #[cfg(feature = "lab")]
 use crate::secondary::df;
 use crate::secondary::{EffectMethods, Method, displacement, dvf, roma, rsm};
-use crate::settings::file::{read_toml, to_toml};
+use crate::settings::file::{given_toml, read_toml, to_toml};
 use crate::settings::{
     Adapter, Bounces, CacheSize, Direction, EffectList, Entry, Environment, ErrorLimit, FrameBudget, Group,
     HostCacheSize, ImageSize, Length, Plane, Policy, Rectangle, Rule, Schedule, SettingsError, Turn, settings,
@@ -535,6 +535,11 @@ impl Settings {
     /// The settings as a settings file, which [`Self::from_toml`] reads.
     pub fn to_toml(&self) -> String {
         to_toml(self)
+    }
+
+    /// What is not as it is by default, as a settings file: one that builds without the laboratory read as well.
+    pub fn to_given_toml(&self) -> String {
+        given_toml(self)
     }
 
     /// What does not count for `trace`, though it is not as it is by default.

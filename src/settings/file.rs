@@ -129,6 +129,12 @@ pub fn to_toml<G: Group>(group: &G) -> String {
     text
 }
 
+/// A group as a settings file of what is not as it is by default: builds with fewer settings read it as well.
+pub fn given_toml<G: Group>(group: &G) -> String {
+    let line = |entry: &Entry| Some(format!("{} = {}\n", entry.key(), toml_value(&group.get(&entry.key())?)));
+    group.given().iter().filter_map(line).collect()
+}
+
 fn toml_value(value: &Plain) -> String {
     match value {
         Plain::Bool(is_on) => is_on.to_string(),

@@ -244,10 +244,15 @@ pub trait Group: Clone + Default + Send + Sync + 'static {
         self.set_all(&all)
     }
 
-    /// The settings that are not as they are by default, as options of the command line.
-    fn options(&self) -> String {
+    /// The settings that are not as they are by default: presets, then what differs from these.
+    fn given(&self) -> Vec<Entry> {
         let presets = Self::entries().into_iter().filter(|entry| entry.field.is_preset);
         let presets = presets.filter(|entry| self.get(&entry.key()) != Some((entry.field.default)()));
+        presets.chain(self.chosen()).collect()
+    }
+
+    /// The settings that are not as they are by default, as options of the command line.
+    fn options(&self) -> String {
         let of = |entry: Entry| {
             let value = self.get(&entry.key())?;
             let flag = entry.field.flag();
@@ -256,7 +261,7 @@ pub trait Group: Clone + Default + Send + Sync + 'static {
                 None => format!("--{flag}"),
             })
         };
-        presets.chain(self.chosen()).filter_map(of).collect::<Vec<_>>().join(" ")
+        self.given().into_iter().filter_map(of).collect::<Vec<_>>().join(" ")
     }
 }
 

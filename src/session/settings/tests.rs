@@ -235,3 +235,13 @@ fn videos_are_named_as_what_they_are() {
         assert!(checked(bad).unwrap_err().to_string().contains("a.y4m"), "{bad}");
     }
 }
+
+#[test]
+fn what_is_given_comes_back() {
+    for options in ["", "--quality high --spp 4", "--denoise --cache 64M --sun 1,2,3 --dvf-points 12 --hide a,b"] {
+        let settings = Settings::from_options(options).unwrap();
+        let text = settings.to_given_toml();
+        assert_eq!(Settings::from_toml(&text), Ok(settings), "{text}");
+        assert_eq!(text.is_empty(), options.is_empty());
+    }
+}
