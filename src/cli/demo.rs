@@ -1,7 +1,8 @@
 //! `brickwalk demo`: a city larger than the cache, generated, converted, walked through and reported.
 
 use super::options::args::{DemoArgs, SceneArgs, VerifyArgs};
-use super::{scene, verify, walk};
+use super::walk::{self, Said};
+use super::{scene, verify};
 use crate::cli::output::note;
 use crate::counters::Record;
 use crate::output::atomic;
@@ -37,7 +38,7 @@ pub fn run(args: &DemoArgs) -> Result<()> {
     }
     .for_pictures();
     step("walk through it out of core", &format!("walk {name} -o {output} {}", settings.options()))?;
-    let records = walk::walk(&file, &args.output, &settings, false)?;
+    let records = walk::walk(&file, &args.output, &settings, Said::default())?;
     let scene = SceneFile::open(&file)?;
     note(&format!("{}\n", shown(&records, PayloadSource::sizes(&scene).sum())))
 }

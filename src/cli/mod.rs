@@ -10,12 +10,14 @@ pub mod convert;
 pub mod demo;
 pub mod info;
 pub mod interrupt;
+pub mod jobs;
 #[cfg(feature = "lab")]
 pub mod lab;
 pub mod man;
 pub mod memory;
 pub mod options;
 pub mod output;
+pub mod part;
 pub mod query;
 pub mod repair;
 pub mod replay;
@@ -88,6 +90,7 @@ pub fn run(command: &Command) -> anyhow::Result<()> {
         Command::Repair(args) => repair::run(args),
         Command::BakeDisplacement(args) => bake_displacement::run(args),
         Command::Walk(args) => walk::run(args),
+        Command::Jobs(args) => jobs::run(args),
         #[cfg(feature = "viewer")]
         Command::View(args) => view::run(args),
         #[cfg(feature = "serve")]

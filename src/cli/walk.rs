@@ -2,12 +2,13 @@
 
 use super::cached;
 use super::options::args::WalkArgs;
+use super::part::{self, Joined};
 use super::watcher::{UntilStopped, Watcher};
-use crate::cli::output::{is_quiet, note, print, warn};
+use crate::cli::output::{Usage, is_quiet, note, print, warn};
 use crate::counters::{COLUMNS, Column, Kind, Record};
 use crate::output::atomic;
 use crate::session::checkpoints::Checkpoint;
-use crate::session::{Pictures, Session, Settings, summary};
+use crate::session::{Pictures, Session, Settings, parts, summary};
 use crate::settings::sizes::{counted, human_bytes};
 use anyhow::{Result, bail};
 use brickwalk_convert::progress::Progress;
@@ -27,15 +28,30 @@ pub fn run(args: &WalkArgs) -> Result<()> {
         return print(&settings.to_toml());
     }
     let (scene, output) = args.files()?;
-    walk(&cached::scene(scene)?, output, &settings, args.json).map(drop)
+    let scene = cached::scene(scene)?;
+    match args.part {
+        Some(part) => part::render(&scene, output, &settings, part),
+        None => walk(&scene, output, &settings, Said { json: args.json, joins: args.join }).map(drop),
+    }
 }
 
-/// Walks through `scene` and writes frames, records, summary and report to `output`; with `json` records are printed,
-/// too. Returns the records.
+/// What is said of a walk, and where its frames come from.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Said {
+    /// Records are printed, too.
+    pub json: bool,
+    /// Frames that have been rendered as parts are taken from there.
+    pub joins: bool,
+}
+
+/// Walks through `scene` and writes frames, records, summary and report to `output`. Returns the records.
 ///
 /// # Errors
 /// As [`run`].
-pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Result<Vec<Record>> {
+pub fn walk(scene: &Path, output: &Path, settings: &Settings, Said { json, joins }: Said) -> Result<Vec<Record>> {
+    if joins {
+        parts::check(settings).map_err(|error| Usage(error.to_string()))?;
+    }
     let mut session = Session::open(scene, settings)?;
     warn(session.take_warnings());
     atomic::create_folder(&output.join("frames"))?;
@@ -45,6 +61,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
         let _ = std::fs::remove_file(output.join(stale));
     }
     let (progress, stop) = (Progress::new(), super::interrupt::flag());
+    let mut joined = joins.then(|| Joined::new(output, session.key())).transpose()?;
     session.prepare(&mut Watcher::new(&progress, stop, settings))?;
     progress.finish();
     warn(session.take_warnings());
@@ -74,7 +91,12 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
     let (mut finished, mut in_writing, mut failed) = (0, None, None);
     while finished < settings.frames && !stop.load(Ordering::Relaxed) {
         let preview = settings.progressive.then(|| pictures.preview());
-        let mut frame = match session.frame_watched(finished, watcher.of_frame(finished, preview)) {
+        let ready = joined.as_mut().and_then(|joined| joined.part(&session, finished));
+        let frame = match ready {
+            Some(part) => session.frame_of_part(part).map(Some),
+            None => session.frame_watched(finished, watcher.of_frame(finished, preview)),
+        };
+        let mut frame = match frame {
             Ok(Some(frame)) => frame,
             Ok(None) => break,
             Err(error) => {
@@ -96,10 +118,16 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, json: bool) -> Res
         return Err(error);
     }
     let left_out = session.left_out(&mut UntilStopped(stop))?;
-    let summary = summary::summary(&mut session, &records, left_out, video);
+    let mut summary = summary::summary(&mut session, &records, left_out, video);
+    if let (Some(joined), Some(summary)) = (&joined, summary.as_object_mut()) {
+        summary.insert("parts".into(), joined.summary());
+    }
     atomic::write(&output.join("summary.json"), (serde_json::to_string_pretty(&summary)? + "\n").as_bytes())?;
     session.write_requests()?;
     brickwalk_report::write(output, &fields())?;
+    if let Some(joined) = joined.filter(|_| finished == settings.frames) {
+        joined.remove(settings.frames);
+    }
     let frames = output.join("frames");
     let mut last = vec![format!("{}: {}", frames.display(), counted(finished.into(), "frame"))];
     last.push(format!("{}: report", output.join("report.html").display()));

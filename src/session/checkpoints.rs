@@ -8,14 +8,14 @@ use super::Settings;
 use crate::frame::Accumulation;
 use crate::metrics::{Encoding, Image, Loaded, compare, load};
 use anyhow::{Context, Result, ensure};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tracing::info;
 
 /// The error of a frame after so many samples; a line of `checkpoints.jsonl`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Checkpoint {
     /// The frame.
     pub frame: u32,

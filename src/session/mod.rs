@@ -14,6 +14,7 @@ mod nodes;
 mod open;
 pub mod opened;
 mod origin;
+pub mod parts;
 mod passed;
 pub mod picture_bytes;
 mod pictures;

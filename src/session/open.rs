@@ -10,7 +10,7 @@ use super::renderer::{finest_cell, lit_renderer};
 use super::trace::{self, Traced};
 use super::viewpoint;
 use crate::counters::Record;
-use crate::frame::{Accumulation, Captures, Engine, FrameWatch, Light, Pixels, RenderError, Renderer};
+use crate::frame::{Accumulation, Captures, Engine, FrameOutput, FrameWatch, Light, Pixels, RenderError, Renderer};
 use crate::kernels::Lod;
 use crate::output::npy::{Hit, Ray};
 use crate::output::{exr, png, srgb};
@@ -119,6 +119,12 @@ pub fn developed(radiance: &[[f32; 3]], stops: f64, tone_map: ToneMap) -> Vec<[u
     srgb::pixels(&shown)
 }
 
+/// A frame as it is without any other.
+pub(super) struct Rendered {
+    pub output: FrameOutput,
+    pub checkpoints: Vec<Checkpoint>,
+}
+
 /// What of all that rendering may need there was, as summaries list it.
 #[derive(Clone, Debug, Default)]
 pub struct LeftOut {
@@ -145,6 +151,8 @@ pub struct Session {
     pub(super) field: Option<Option<Note>>,
     /// The stops of every frame so far.
     pub(super) stops: Vec<f64>,
+    /// Whether a frame has been rendered.
+    has_rendered: bool,
     meter: Meter,
     motion: Option<SceneMotion>,
     /// What the samples of frames are measured against.
@@ -208,6 +216,7 @@ impl Session {
             resolve: Resolve::new(settings.denoise, settings.taa),
             field: (!settings.secondary.has(Method::Dvf)).then_some(None),
             stops: Vec::new(),
+            has_rendered: false,
             meter: Meter::new(settings.exposure, settings.tone_map.white()),
             motion,
             references,
@@ -267,21 +276,39 @@ impl Session {
     /// # Errors
     /// As [`Session::frame`]; a place that is too far out.
     pub fn frame_watched(&mut self, number: u32, watch: &mut dyn Watch) -> Result<Option<Frame>> {
-        let frames = self.settings.frames;
+        self.place(number)?;
+        self.render(number, &self.path.frame(number, self.settings.frames), watch)
+    }
+
+    /// Places what moves where it is in a frame of the camera path.
+    pub(super) fn place(&mut self, number: u32) -> Result<()> {
         if let Some(motion) = &self.motion {
-            let time = self.path.time(number, frames);
+            let time = self.path.time(number, self.settings.frames);
             motion.place(&mut self.renderer, time)?;
             if let Some(reference) = &mut self.reference {
                 motion.place(reference, time)?;
             }
         }
-        self.render(number, &self.path.frame(number, frames), watch)
+        Ok(())
     }
 
     fn render(&mut self, number: u32, camera: &Camera, watch: &mut dyn Watch) -> Result<Option<Frame>> {
+        match self.render_alone(number, camera, watch)? {
+            Some(rendered) => self.go_on_with(number, rendered).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// Renders a frame up to where earlier frames come in.
+    pub(super) fn render_alone(
+        &mut self,
+        number: u32,
+        camera: &Camera,
+        watch: &mut dyn Watch,
+    ) -> Result<Option<Rendered>> {
         self.prepare(watch)?;
         let name = || self.file.display().to_string();
-        let is_first = self.stops.is_empty();
+        let is_first = !std::mem::replace(&mut self.has_rendered, true);
         let renderer = &mut self.renderer;
         if is_first && self.settings.measure_left_out {
             self.first = Some((renderer.scene.clone(), renderer.light.clone()));
@@ -313,11 +340,18 @@ impl Session {
             reference.frame(number, camera).with_context(name)?;
             note_errors(&mut output.records, renderer, reference);
         }
-        self.resolve.frame_on(&mut renderer.engine, &mut output).with_context(name)?;
+        Ok(Some(Rendered { output, checkpoints }))
+    }
+
+    /// Makes the next frame of what was rendered: filters and exposure, for which frames come in their order.
+    pub(super) fn go_on_with(&mut self, number: u32, rendered: Rendered) -> Result<Frame> {
+        let Rendered { mut output, checkpoints } = rendered;
+        let renderer = &mut self.renderer;
+        self.resolve.frame_on(&mut renderer.engine, &mut output).with_context(|| self.file.display().to_string())?;
         let seconds = self.path.frame_time(self.settings.frames);
         let stops = self.meter.stops(&output.pixels.radiance, &output.coverage, seconds);
         self.stops.push(stops);
-        Ok(Some(Frame {
+        Ok(Frame {
             number,
             size: renderer.size,
             pixels: output.pixels,
@@ -325,7 +359,7 @@ impl Session {
             checkpoints,
             exposure_ev: stops,
             tone_map: self.settings.tone_map,
-        }))
+        })
     }
 
     /// Finds the closest hits of rays in world space, in their order; with `any` only whether there is one.

@@ -41,6 +41,7 @@ mod exact {
     mod hidden;
     mod levels;
     mod motion;
+    mod parts;
     mod paths;
     mod rays;
     mod records;

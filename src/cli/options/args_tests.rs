@@ -289,6 +289,7 @@ fn help_explains_units_and_defaults() {
         "convert",
         "demo",
         "info",
+        "jobs",
         "man",
         "query",
         "repair",

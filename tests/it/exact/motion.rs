@@ -26,7 +26,7 @@ use xxhash_rust::xxh3::xxh3_64;
 const TIMES: [f64; 3] = [0.0, 1.5, 3.0];
 
 /// The box turns above the others, then comes out of the room, which the scene's bounds follow.
-const MOTION: &str = r#"{"instances": [{"node": "orbiting box", "keyframes": [
+pub(super) const MOTION: &str = r#"{"instances": [{"node": "orbiting box", "keyframes": [
     {"time": 0, "translation": [-0.4, -0.3, 0.2], "rotation": [0.2, 0.5, 0.1, 0.9]},
     {"time": 2, "translation": [-1.2, -1.0, 1.1], "rotation": [0.5, 0.5, -0.1, 0.3], "scale": 1.25},
     {"time": 3, "translation": [-1.4, -1.2, 1.9]}]}]}"#;
@@ -34,7 +34,7 @@ const MOTION: &str = r#"{"instances": [{"node": "orbiting box", "keyframes": [
 const ALL: &str = "--effects shadow,ao,diffuse,glossy --ao-rays 1 --diffuse-rays 1 --sun 0.3,0.4,1 --aov";
 
 /// A Cornell box, its mover where `matrix` says, shining or not.
-fn source(matrix: Option<[f64; 12]>, shines: bool) -> SourceScene {
+pub(super) fn source(matrix: Option<[f64; 12]>, shines: bool) -> SourceScene {
     let settings = Settings { kind: Kind::Cornell, triangles: 10_000, seed: 3, ..Settings::default() };
     let mut source = generate(&settings, &Progress::hidden()).expect("a count in range").whole();
     let mover = source.placements.iter_mut().find(|one| one.name == "orbiting box").expect("a mover");
@@ -46,7 +46,7 @@ fn source(matrix: Option<[f64; 12]>, shines: bool) -> SourceScene {
     common::polished(source)
 }
 
-fn convert(folder: &Path, name: &str, source: SourceScene) -> PathBuf {
+pub(super) fn convert(folder: &Path, name: &str, source: SourceScene) -> PathBuf {
     let path = folder.join(name);
     let settings = BuildSettings { brick_triangles: 400, movable: vec!["orb*".into()], ..BuildSettings::default() };
     build(source, &settings, &path, &Progress::hidden()).expect("a scene");

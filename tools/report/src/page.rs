@@ -13,8 +13,8 @@ const STYLE: &str = include_str!("style.css");
 /// Values under the pointer, sorting, CSV.
 const SCRIPT: &str = include_str!("script.js");
 /// Parts of the summary that the page shows in places of their own, or computes from the records.
-const SHOWN_APART: [&str; 7] =
-    ["settings", "scene", "adapter", "left_out", "memory", "passes", "texture_bytes_resident"];
+const SHOWN_APART: [&str; 8] =
+    ["settings", "scene", "adapter", "left_out", "memory", "parts", "passes", "texture_bytes_resident"];
 
 /// The whole page as HTML.
 ///
@@ -340,6 +340,7 @@ fn all_tables(walk: &Walk, fields: &[Field]) -> Markup {
                 p { a href="records.csv" { "records.csv" } ", " a href="records.jsonl" { "records.jsonl" } }
             }
         }
+        @if let Some(workers) = workers(walk) { section { h2 { "Workers" } (workers) } }
         section { h2 { "Left out, and why" } (left_out(walk)) }
         section { h2 { "Memory" } (memory(walk)) }
         section {
@@ -358,6 +359,28 @@ fn all_tables(walk: &Walk, fields: &[Field]) -> Markup {
             @if let Some(table) = tables::pairs(&others) { details { summary { "Also in the summary" } (table) } }
         }
     }
+}
+
+/// Who rendered frames that were joined, a row each; `None` of a walk that rendered its frames itself.
+fn workers(walk: &Walk) -> Option<Markup> {
+    let rows = walk.summary("parts/workers")?.as_array().filter(|rows| !rows.is_empty())?;
+    let number = |row: &Value, name: &str| row.get(name).and_then(Value::as_f64).unwrap_or_default();
+    Some(html! {
+        p.reading { "Frames were rendered apart and joined in their order. Seconds are those of rendering." }
+        div.wide { table {
+            thead { tr { th { "worker" } th { "frames" } th { "seconds" } th { "seconds a frame" } th { "loaded" } } }
+            tbody { @for row in rows {
+                @let [frames, seconds] = [number(row, "frames"), number(row, "seconds")];
+                tr {
+                    th scope="row" { (row.get("worker").and_then(Value::as_str).unwrap_or_default()) }
+                    td { (format::count(frames)) }
+                    td { (format::number(seconds)) }
+                    td { (format::number(seconds / frames.max(1.0))) }
+                    td { (format::bytes(number(row, "bytes_loaded"))) }
+                }
+            } }
+        } }
+    })
 }
 
 /// What rendering left out because the scene does not need it.
