@@ -11,6 +11,7 @@
 //! | `rows` | rows of arrays as rays and points, and what is wrong with them |
 //! | `scene` | the class that the package wraps |
 //! | `render` | pictures |
+//! | `parts` | frames of a walk that are rendered apart |
 //! | `query` | intersections, nearest points, what is inside |
 //! | `build` | scene files from arrays and from models |
 //! | `errors` | errors as exceptions |
@@ -20,6 +21,7 @@ use pyo3::prelude::*;
 mod build;
 mod errors;
 mod held;
+mod parts;
 mod query;
 mod render;
 mod rows;
@@ -32,6 +34,7 @@ fn _brickwalk(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("BrickwalkError", module.py().get_type::<errors::BrickwalkError>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<scene::Core>()?;
+    module.add_class::<parts::WalkParts>()?;
     module.add_function(wrap_pyfunction!(build::build_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(build::convert, module)?)?;
     module.add_function(wrap_pyfunction!(build::generate, module)?)?;

@@ -52,7 +52,7 @@ pub fn pinhole<'py>(
 }
 
 /// Tells how far a picture is, and stops it when nobody waits for it.
-struct Watching<'a>(&'a Arc<Task>);
+pub struct Watching<'a>(pub &'a Arc<Task>);
 
 impl FrameWatch for Watching<'_> {
     fn passes(&mut self, done: u32, about: u32) -> bool {

@@ -16,7 +16,7 @@ Lengths are in units of the scene, metres where it came from glTF. Angles are in
 import numpy as _numpy  # noqa: F401
 
 from . import trimesh
-from ._brickwalk import BrickwalkError, __version__
+from ._brickwalk import BrickwalkError, WalkParts, __version__
 from ._camera import Camera, pinhole
 from ._convert import convert, generate
 from ._picture import Picture
@@ -30,6 +30,7 @@ __all__ = [
     "Picture",
     "RaycastingScene",
     "Scene",
+    "WalkParts",
     "__version__",
     "convert",
     "generate",

@@ -63,6 +63,28 @@ class Core:
         self, settings: str, chosen: list[str], camera: Camera | None, progress: Progress
     ) -> tuple[dict[str, NDArray[Any]], list[str]]: ...
 
+class WalkParts:
+    """Frames of a walk that are rendered apart, for ``brickwalk walk --join``.
+
+    ``scene`` is a path or a URL, ``settings`` the text that ``brickwalk walk ... --print-settings`` prints. Any process
+    may render any frame, in any order. The session is opened by the first frame and stays open.
+    """
+
+    def __new__(cls, scene: str, settings: str, disk_cache: str | None = None) -> WalkParts: ...
+    @property
+    def key(self) -> str:
+        """16 hexadecimal digits that only parts of the same walk have."""
+    @property
+    def frames(self) -> int:
+        """Frames of the walk."""
+    def render(self, output: str, number: int, progress: Progress) -> dict[str, Any]:
+        """Renders frame ``number`` into the folder ``output``, unless its part is there and whole.
+
+        Returns ``path``, ``frame``, ``is_new``, ``worker``, ``seconds``, ``bytes_loaded``, of a scene by URL ``requests``,
+        ``bytes_fetched`` and ``seconds_waiting``, and ``warnings``.
+        """
+    def close(self) -> None: ...
+
 def build_mesh(
     vertices: Rows, faces: NDArray[np.int64], out: str, brick_triangles: int, progress: Progress
 ) -> None: ...
