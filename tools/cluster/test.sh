@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Installs the package beside the wheel that tools/python/test.sh has built, and runs its tests. Options go to pytest.
+# BRICKWALK names the program; else the one of this checkout is taken, built if need be.
+set -euo pipefail
+
+root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.." && pwd)
+. "$root/tools/prepare.sh"
+
+target=${CARGO_TARGET_DIR:-$root/target}
+environment=$target/python/venv
+[ -x "$environment/bin/python" ] || fail "$environment is missing; run tools/python/test.sh first"
+if [ -z "${BRICKWALK:-}" ]; then
+    prepare
+    # With --workspace as all else is built, so that nothing is compiled again.
+    cargo build --quiet --release --workspace --manifest-path "$root/Cargo.toml" --bin brickwalk
+    BRICKWALK=$target/release/brickwalk
+fi
+export BRICKWALK PYTHONDONTWRITEBYTECODE=1
+"$environment/bin/python" -m pip install --quiet --disable-pip-version-check \
+    'distributed>=2024.1' 'openjd-cli>=0.8' pytest 'setuptools>=69' wheel
+"$environment/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \
+    --force-reinstall "$root/tools/cluster"
+rm -rf "$root/tools/cluster/build" "$root/tools/cluster/brickwalk_cluster.egg-info"
+# Away from the sources, so that what is installed is what is tested.
+cd "$target/python"
+"$environment/bin/python" -m pytest --quiet -p no:cacheprovider --rootdir "$root/tools/cluster" \
+    -c "$root/tools/cluster/pyproject.toml" "$@" "$root/tools/cluster/tests"

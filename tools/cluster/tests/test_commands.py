@@ -1,0 +1,70 @@
+"""Studies and benchmarks over a cluster have the rows of one machine's."""
+
+import json
+
+import pytest
+
+from brickwalk_cluster import Cluster, Failed
+from brickwalk_cluster.commands import merge, split
+from brickwalk_cluster.command import run as command
+
+
+def rows(folder):
+    first, *lines = (folder / "rows.jsonl").read_text().splitlines()
+    return json.loads(first), [json.loads(line) for line in lines]
+
+
+def named(row):
+    """What tells a measurement from others."""
+    return json.dumps([row[name] for name in ("view", "effect", "method", "settings", "cache_bytes", "cold")])
+
+
+def test_options_are_split():
+    rest, option, values, output = split("study", ["s.bricks", "--quick", "-o", "out", "--effects=ao,shadow"])
+    assert (rest, option, values, str(output)) == (["s.bricks", "--quick"], "--effects", ["ao", "shadow"], "out")
+    assert len(split("bench roma", ["--output=out"])[2]) == 8
+    with pytest.raises(Failed, match="-o DIR"):
+        split("study", ["s.bricks"])
+    with pytest.raises(Failed, match="--effects: a value"):
+        split("study", ["s.bricks", "--effects"])
+
+
+def test_a_study_has_the_rows_of_one_machine(city, run, tmp_path, capfd):
+    options = ["--quick", "--size", "32x18", "--samples", "2", "--repeat", "1", "--effects", "ao,diffuse"]
+    options += ["--caches", "100", "--adapter", "cpu"]
+    run("study", city, "-o", tmp_path / "whole", *options)
+    line = ["study", str(city), "-o", str(tmp_path / "out"), *options, "--workers", "2", "-q"]
+    assert command(line) == 0, capfd.readouterr().err
+    (header, own), (truth_header, truth) = rows(tmp_path / "out"), rows(tmp_path / "whole")
+    assert header == truth_header
+    assert sorted(map(named, own)) == sorted(map(named, truth)) and len(own) > 4
+    # Errors do not depend on who measures, times do.
+    errors = {named(row): row["flip_same"] for row in truth}
+    assert {named(row): row["flip_same"] for row in own} == errors
+    for name in ("study.json", "study.csv", "report.html"):
+        assert (tmp_path / "out" / name).exists()
+    # A rerun measures nothing.
+    before = (tmp_path / "out" / "rows.jsonl").read_text()
+    assert command(line) == 0
+    assert sorted((tmp_path / "out" / "rows.jsonl").read_text().splitlines()) == sorted(before.splitlines())
+
+
+def test_rows_of_other_devices_are_refused(tmp_path):
+    for number, name in enumerate(["one", "other"]):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        head = json.dumps({"format": 1, "settings": {}, "adapter": {"name": name}, "commit": "1"})
+        (folder / "rows.jsonl").write_text(head + "\n" + json.dumps({"row": number}) + "\n")
+    with pytest.raises(Failed, match="another adapter"):
+        merge(tmp_path / "out", [tmp_path / "0", tmp_path / "1"])
+    assert merge(tmp_path / "out", [tmp_path / "0"]) == 1
+    assert merge(tmp_path / "out", [tmp_path / "0"]) == 1
+
+
+def test_what_a_part_says_is_passed_on(tmp_path, program, capfd):
+    with Cluster(workers=1):
+        pass
+    line = ["study", "none.bricks", "-o", str(tmp_path / "out"), "--effects", "ao", "--workers", "1", "-q"]
+    assert command(line) == 1
+    said = capfd.readouterr().err.strip().splitlines()[-1]
+    assert said.startswith("brickwalk-cluster: ") and "none.bricks" in said

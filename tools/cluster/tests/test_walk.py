@@ -1,0 +1,197 @@
+"""Walks over a cluster have the bytes of one machine's, whoever dies."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+
+import psutil
+import pytest
+from conftest import frames
+
+from brickwalk_cluster import Cluster, Failed, walk
+from brickwalk_cluster.command import run as command
+from brickwalk_cluster.walk import DONE, is_done, ranges
+
+#: Denoised frames with an automatic exposure: each depends on those before it.
+VIEW = ["--frames", "60", "--size", "64x36", "--adapter", "cpu"]
+
+
+@pytest.fixture(scope="module")
+def whole(city, run, tmp_path_factory):
+    """What one machine makes."""
+    output = tmp_path_factory.mktemp("whole")
+    run("walk", city, "-o", output, *VIEW)
+    return frames(output)
+
+
+def words(city, output):
+    return [str(city), "-o", str(output), *VIEW]
+
+
+def test_ranges_have_every_frame_once():
+    for count, chunk in [(1, 1), (60, 7), (5, 100)]:
+        assert sum(ranges(count, chunk), []) == list(range(count))
+
+
+@pytest.mark.parametrize("workers", [2, 4])
+def test_frames_are_those_of_one_machine(city, whole, tmp_path, workers):
+    log = tmp_path / "log"
+    with Cluster(workers=workers) as cluster:
+        done = walk(cluster, words(city, tmp_path), chunk=4, is_quiet=True, log=str(log))
+        assert done["frames"] == done["rendered"] == 60
+        assert frames(tmp_path) == whole
+        assert Counter(log.read_text().split()) == Counter(map(str, range(60)))
+        summary = json.loads((tmp_path / "summary.json").read_text())
+        rows = summary["parts"]["workers"]
+        assert len(rows) == workers and sum(row["frames"] for row in rows) == 60
+        assert len((tmp_path / "records.jsonl").read_text().splitlines()) >= 60
+        # A rerun finds that all is there; a picture that was changed is made again.
+        assert walk(cluster, words(city, tmp_path), is_quiet=True)["rendered"] == 0
+        picture = tmp_path / "frames" / "0007.png"
+        picture.write_bytes(picture.read_bytes()[:-1])
+        assert not is_done(tmp_path, done["key"])
+        assert walk(cluster, words(city, tmp_path), is_quiet=True)["rendered"] == 60
+        assert frames(tmp_path) == whole
+
+
+def kill_workers(times, seed, stop):
+    """Kills a worker at each of so many random moments; returns the numbers of those that were killed."""
+    draw, killed = random.Random(seed), []
+
+    def kill():
+        while len(killed) < times and not stop.wait(draw.uniform(0.3, 1.2)):
+            # What a nanny of Dask has started, and starts again.
+            workers = [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]
+            if workers:
+                worker = draw.choice(workers)
+                worker.kill()
+                killed.append(worker.pid)
+
+    thread = threading.Thread(target=kill, daemon=True)
+    thread.start()
+    return killed, thread
+
+
+def test_workers_that_are_killed_lose_nothing(city, whole, tmp_path):
+    log, stop = tmp_path / "log", threading.Event()
+    with Cluster(workers=4) as cluster:
+        killed, thread = kill_workers(10, 38, stop)
+        # The walk is made until ten have been killed, each time from nothing.
+        rounds = 0
+        while rounds == 0 or (len(killed) < 10 and rounds < 40):
+            output = tmp_path / f"out-{rounds}"
+            walk(cluster, words(city, output), chunk=3, is_quiet=True, log=f"{log}-{rounds}")
+            assert frames(output) == whole
+            times = Counter((tmp_path / f"log-{rounds}").read_text().split())
+            assert len(times) == 60 and max(times.values()) <= 2, times.most_common(3)
+            rounds += 1
+        stop.set()
+        thread.join(20)
+        assert len(killed) == 10
+
+
+def test_a_scheduler_that_is_killed_loses_nothing(city, whole, tmp_path, program):
+    """The command and its scheduler are one process here: it is killed, and run again."""
+    line = [sys.executable, "-m", "brickwalk_cluster.command", "walk", *words(city, tmp_path), "--workers", "2"]
+    line += ["--chunk", "2"]
+    parts = tmp_path / "parts"
+    process = subprocess.Popen(line, start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 120
+    while not parts.is_dir() or len(list(parts.glob("*.part"))) < 10:
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    before = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.part")}
+    assert before and not (tmp_path / DONE).exists()
+    again = subprocess.run(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert again.returncode == 0, again.stderr
+    rendered = int(again.stdout.split(" rendered")[0].split()[-1])
+    assert rendered <= 60 - len(before) + 2
+    assert frames(tmp_path) == whole
+
+
+def test_a_scheduler_elsewhere_that_goes_away_and_comes_back(city, whole, tmp_path):
+    def start():
+        words = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
+        file = tmp_path / f"scheduler-{time.monotonic_ns()}.json"
+        scheduler = subprocess.Popen([*words, "--scheduler-file", str(file)], stderr=subprocess.DEVNULL)
+        workers = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1"]
+        workers += ["--nworkers", "2", "--memory-limit", "0", "--no-dashboard", "--death-timeout", "20"]
+        worker = subprocess.Popen(workers, stderr=subprocess.DEVNULL, start_new_session=True)
+        deadline = time.monotonic() + 60
+        while not file.exists() or not file.read_text().strip():
+            assert time.monotonic() < deadline and scheduler.poll() is None
+            time.sleep(0.05)
+        return scheduler, worker, json.loads(file.read_text())["address"]
+
+    def end(*processes):
+        for process in processes:
+            try:
+                os.killpg(process.pid, signal.SIGKILL) if process is not processes[0] else process.kill()
+            except ProcessLookupError:
+                pass
+            process.wait()
+
+    scheduler, worker, address = start()
+    parts = tmp_path / "out" / "parts"
+    line = [sys.executable, "-m", "brickwalk_cluster.command", "walk", *words(city, tmp_path / "out"), "--chunk", "2"]
+    try:
+        process = subprocess.Popen([*line, "--scheduler", address], stderr=subprocess.PIPE, text=True)
+        deadline = time.monotonic() + 120
+        while not parts.is_dir() or len(list(parts.glob("*.part"))) < 6:
+            assert process.poll() is None and time.monotonic() < deadline
+            time.sleep(0.02)
+        scheduler.kill()
+        _, said = process.communicate(timeout=120)
+        assert process.returncode == 1 and "goes on where this one stopped" in said, said
+    finally:
+        end(scheduler, worker)
+    scheduler, worker, address = start()
+    try:
+        assert command(["walk", *words(city, tmp_path / "out"), "--chunk", "2", "--scheduler", address, "-q"]) == 0
+    finally:
+        end(scheduler, worker)
+    assert frames(tmp_path / "out") == whole
+
+
+def test_what_is_wrong_is_said_in_a_line(city, tmp_path, program, capfd, monkeypatch):
+    cases = [
+        (["walk", "none.bricks", "-o", str(tmp_path / "a")], "none.bricks"),
+        (["walk", str(city), "-o", str(tmp_path / "a"), "--frame-budget", "8M"], "--frame-budget"),
+        (["walk", str(city), "-o", str(tmp_path / "a"), "--nonsense"], "--nonsense"),
+        (["walk", str(city), "-o", str(tmp_path / "a"), "--scheduler", "tcp://127.0.0.1:9"], "no scheduler of Dask"),
+    ]
+    for line, named in cases:
+        assert command([*line, *([] if "--scheduler" in line else ["--workers", "1"])]) == 1
+        said = capfd.readouterr().err.strip().splitlines()
+        assert named in said[-1] and said[-1].startswith("brickwalk-cluster: "), said
+    assert not (tmp_path / "a").exists()
+    monkeypatch.setenv("BRICKWALK", "no-such-program")
+    with Cluster(workers=1) as cluster, pytest.raises(Failed, match="BRICKWALK names no program"):
+        walk(cluster, words(city, tmp_path))
+
+
+def test_a_changed_part_is_noticed(city, whole, tmp_path, program):
+    """The control: were parts not checked, a bit that turned in one would show in the pictures."""
+    output = tmp_path / "out"
+    with Cluster(workers=1) as cluster:
+        log = tmp_path / "log"
+        walk(cluster, words(city, output), is_quiet=True)
+        (output / DONE).unlink()
+        parts = output / "parts"
+        line = ["walk", *words(city, output), "--part", "0-59"]
+        subprocess.run([program, "-q", *line], check=True)
+        changed = parts / "0031.part"
+        data = bytearray(changed.read_bytes())
+        data[len(data) // 2] ^= 16
+        changed.write_bytes(data)
+        done = walk(cluster, words(city, output), is_quiet=True, log=str(log))
+        assert done["rendered"] == 1 and log.read_text().split() == ["31"]
+        assert frames(output) == whole
