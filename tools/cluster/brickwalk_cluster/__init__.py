@@ -6,6 +6,8 @@ the truth: a rerun finds what is whole and does the rest.
 """
 
 from .cluster import Cluster, Failed, Progress
+from .commands import measure
+from .conversion import convert
 from .walk import walk
 
-__all__ = ["Cluster", "Failed", "Progress", "walk"]
+__all__ = ["Cluster", "Failed", "Progress", "convert", "measure", "walk"]

@@ -134,6 +134,13 @@ class Progress:
         self.done += count
         self.before += count
 
+    def reach(self, done: int, total: int, workers: int) -> None:
+        """So many of so many are done, by so many workers; a smaller total begins anew."""
+        if total != self.total:
+            self.total, self.done, self.before, self._start = total, 0, 0, self._clock()
+        if done > self.done:
+            self.advance(done - self.done, workers)
+
     def advance(self, count: int, workers: int) -> None:
         """So many more are done, by so many workers."""
         self.done += count
