@@ -80,6 +80,15 @@ impl Writer {
         Ok(self.position)
     }
 
+    /// Waits until everything written is on the disk, so that other machines read it too ([`Written::partial`]).
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn sync(&mut self) -> Result<(), Error> {
+        self.checkpoint()?;
+        self.file.get_ref().as_file().sync_data().map_err(|source| self.write_error(source))
+    }
+
     /// Opens what has been written so far, to read payloads back. More may be written meanwhile.
     ///
     /// # Errors
@@ -238,6 +247,20 @@ pub struct Written {
 }
 
 impl Written {
+    /// Opens what another process has written so far, from [`Writer::reserve`], of the file that will be called `path`.
+    ///
+    /// # Errors
+    /// It cannot be opened.
+    pub fn partial(path: impl AsRef<Path>) -> Result<Self, Error> {
+        let (path, target, name) = names(path.as_ref())?;
+        let file = File::open(folder_of(&target).join(format!("{name}.partial")));
+        let file = file.map_err(|source| {
+            let action = "read what is written of the file so far; let every worker see its folder".to_owned();
+            Error::Io { path: path.clone(), action, part: None, source }
+        })?;
+        Ok(Self { path, source: ReadSource::new(file) })
+    }
+
     /// The bytes of a payload as they were given to [`Writer::write`]; any thread may ask.
     ///
     /// # Errors

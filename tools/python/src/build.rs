@@ -15,7 +15,7 @@ use brickwalk_scenes::{Kind, Settings};
 use numpy::{PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -25,7 +25,7 @@ use std::time::Duration;
 const POLL: Duration = Duration::from_millis(20);
 
 /// Does `work`, which is told to stop when nobody waits for it any more.
-fn watched<T>(task: &Task, work: impl FnOnce(&progress::Progress) -> T) -> T {
+pub fn watched<T>(task: &Task, work: impl FnOnce(&progress::Progress) -> T) -> T {
     let (progress, ended) = (progress::Progress::hidden(), AtomicBool::new(false));
     thread::scope(|scope| {
         // However the work ends.
@@ -55,7 +55,8 @@ fn threads() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
 
-fn built(result: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
+/// What was built; an interrupted conversion is told in the words of the package.
+pub fn built(result: Result<BuildSummary, BuildError>) -> Result<BuildSummary> {
     match result {
         Err(BuildError::Paused { scratch }) => {
             bail!("interrupted; the same conversion with resume=True continues ({} is kept)", scratch.display())
@@ -156,13 +157,37 @@ pub fn generate(
 }
 
 /// Settings of a conversion, by their names in the package.
-struct Conversion {
-    inputs: Vec<Input>,
-    importing: ImportSettings,
-    building: BuildSettings,
+pub struct Conversion {
+    pub inputs: Vec<Input>,
+    pub importing: ImportSettings,
+    pub building: BuildSettings,
 }
 
 impl Conversion {
+    /// Of models into the scene file `out`.
+    ///
+    /// # Errors
+    /// A setting that there is not, or that is out of its range.
+    pub fn new(py: Python<'_>, inputs: Vec<PathBuf>, out: &Path, settings: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).map(PathBuf::from);
+        let importing = ImportSettings { threads: Some(threads()), scratch: folder, movable: Vec::new() };
+        let building = BuildSettings { threads: Some(threads()), ..BuildSettings::default() };
+        let inputs = inputs.into_iter().map(Input::from).collect();
+        let mut conversion = Self { inputs, importing, building };
+        for (name, value) in settings {
+            let name: String = name.extract()?;
+            conversion.set(&name, &value).map_err(|error| {
+                let text = format!("{name}: {}", error.value(py));
+                match error.is_instance_of::<pyo3::exceptions::PyTypeError>(py) {
+                    true => pyo3::exceptions::PyTypeError::new_err(text),
+                    false => wrong(text),
+                }
+            })?;
+        }
+        conversion.importing.threads = conversion.building.threads;
+        Ok(conversion)
+    }
+
     /// Takes one setting.
     fn set(&mut self, name: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
         let building = &mut self.building;
@@ -229,22 +254,7 @@ pub fn convert<'py>(
     settings: &Bound<'py, PyDict>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).map(PathBuf::from);
-    let importing = ImportSettings { threads: Some(threads()), scratch: folder, movable: Vec::new() };
-    let building = BuildSettings { threads: Some(threads()), ..BuildSettings::default() };
-    let inputs = inputs.into_iter().map(Input::from).collect();
-    let mut conversion = Conversion { inputs, importing, building };
-    for (name, value) in settings {
-        let name: String = name.extract()?;
-        conversion.set(&name, &value).map_err(|error| {
-            let text = format!("{name}: {}", error.value(py));
-            match error.is_instance_of::<pyo3::exceptions::PyTypeError>(py) {
-                true => pyo3::exceptions::PyTypeError::new_err(text),
-                false => wrong(text),
-            }
-        })?;
-    }
-    conversion.importing.threads = conversion.building.threads;
+    let conversion = Conversion::new(py, inputs, &out, settings)?;
     let work = move |task: &Arc<Task>| {
         watched(task, |progress| {
             let Conversion { inputs, importing, building } = &conversion;
@@ -253,6 +263,11 @@ pub fn convert<'py>(
         })
     };
     let summary = run_alone(py, &mut Progress::new(progress, 0), work)?;
+    told(py, summary)
+}
+
+/// The counts of a conversion.
+pub fn told(py: Python<'_>, summary: BuildSummary) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
     dict.set_item("triangles", summary.triangles_instanced)?;
     dict.set_item("triangles_stored", summary.triangles_stored)?;

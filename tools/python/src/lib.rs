@@ -14,6 +14,7 @@
 //! | `parts` | frames of a walk that are rendered apart |
 //! | `query` | intersections, nearest points, what is inside |
 //! | `build` | scene files from arrays and from models |
+//! | `shared` | conversions whose tasks other processes do |
 //! | `errors` | errors as exceptions |
 
 use pyo3::prelude::*;
@@ -26,6 +27,7 @@ mod query;
 mod render;
 mod rows;
 mod scene;
+mod shared;
 mod worker;
 
 #[pymodule]
@@ -37,6 +39,8 @@ fn _brickwalk(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<parts::WalkParts>()?;
     module.add_function(wrap_pyfunction!(build::build_mesh, module)?)?;
     module.add_function(wrap_pyfunction!(build::convert, module)?)?;
+    module.add_class::<shared::ConversionWorker>()?;
+    module.add_function(wrap_pyfunction!(shared::convert_shared, module)?)?;
     module.add_function(wrap_pyfunction!(build::generate, module)?)?;
     module.add_function(wrap_pyfunction!(render::pinhole, module)?)
 }

@@ -2,9 +2,12 @@
 
 use super::assemble::{self, Dropped};
 use super::bounded::budget::{self, Budget};
+use super::bounded::chunks::WrittenBricks;
 use super::bounded::cuts::{Bounded, BoundedCuts};
+use super::bounded::distribute::Distribution;
+use super::crew::Hands;
 use super::cut::cuts::{self, ObjectCut};
-use super::disk::journal::{self, Journal, Step};
+use super::disk::journal::{self, Journal, Step, WordReader, Words};
 use super::disk::scratch::{self, Scratch};
 use super::encode::brick::{self, BrickContext, EncodedBrick};
 use super::encode::jobs::{self, BrickWriter, Job};
@@ -29,6 +32,9 @@ use xxhash_rust::xxh3::Xxh3;
 /// Triangles a thread encodes before what is encoded is written, where everything is in memory.
 const BATCH_TRIANGLES: usize = 1 << 18;
 
+/// Stack of a worker: the partition recurses, and a thread that waits takes up other work on the same stack.
+const STACK_BYTES: usize = 16 << 20;
+
 /// One conversion.
 pub(super) struct Conversion<'a> {
     /// What is converted.
@@ -41,6 +47,8 @@ pub(super) struct Conversion<'a> {
     pub settings: &'a BuildSettings,
     /// Where to.
     pub output: &'a Path,
+    /// By whom.
+    pub hands: Hands<'a>,
     /// Who watches.
     pub progress: &'a Progress,
 }
@@ -119,7 +127,7 @@ impl Conversion<'_> {
         let contexts = jobs::contexts(&lattices, &means, &opacity, &wants, settings);
         let jobs = jobs::jobs(cuts.iter().map(|cut| cut.bricks.as_slice()))?;
         progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
-        let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.len(), BATCH_TRIANGLES);
+        let mut bricks = BrickWriter::new(writer, cuts.len(), BATCH_TRIANGLES);
         let encode = |job: &Job| encode_loaded(&reader, &plan.objects[job.object as usize], &cuts, &contexts, job);
         bricks.write(&jobs, encode, progress)?;
         let (bricks, occupancy, rounded_away) = (bricks.records, bricks.occupancy, bricks.dropped);
@@ -127,7 +135,7 @@ impl Conversion<'_> {
         let (images, pieces) = ((textures, opacities, warnings), (cuts, used_materials, lattices));
         let mut written = Written::without_levels(images, pieces, (bricks, occupancy, rounded_away));
         budget::keep();
-        self.write_levels(&mut written, (writer, None), BATCH_TRIANGLES)?;
+        self.write_levels(&mut written, (Some(writer), None), BATCH_TRIANGLES)?;
         clock.end("levels");
         Ok(written)
     }
@@ -141,7 +149,7 @@ impl Conversion<'_> {
     fn write_levels(
         &self,
         written: &mut Written,
-        (writer, journal): (&mut Writer, Option<&mut Journal>),
+        (writer, on_disk): (Option<&mut Writer>, Option<(&Scratch, &mut Journal)>),
         batch_triangles: usize,
     ) -> Result<(), BuildError> {
         if !self.settings.lod {
@@ -160,17 +168,25 @@ impl Conversion<'_> {
             placed: self.plan.resting(&settings.movable),
             brick_triangles: settings.brick_triangles,
         });
-        let mut levels = LevelWriter {
-            writer,
+        let maker = levels::Maker {
             bricks,
             instances: &instances,
             contexts: &contexts,
             flattened: &flattened,
             brick_triangles: settings.brick_triangles,
-            batch_triangles,
             progress: self.progress,
         };
-        let levels = levels.write(&plan, journal)?;
+        let levels = match (on_disk, writer) {
+            (Some((scratch, journal)), writer) if self.hands.are_many() => {
+                let partial = self.output;
+                levels::LevelTasks { maker, writer, hands: self.hands, scratch, partial }.write(&plan, journal)?
+            }
+            (on_disk, Some(writer)) => {
+                let journal = on_disk.map(|(_, journal)| journal);
+                LevelWriter { maker, writer, batch_triangles }.write(&plan, journal)?
+            }
+            (_, None) => Levels::default(),
+        };
         let added = flattened.added;
         (written.levels, written.added_materials) = (levels, added);
         Ok(())
@@ -186,14 +202,37 @@ impl Conversion<'_> {
         let mut clock = Clock::new();
         let (mut scratch, mut journal, mut writer) = self.begin(&budget)?;
         clock.end("begin");
-        match self.write_bounded(budget, &scratch, &mut journal, &mut writer, &mut clock) {
+        match self.write_bounded(budget, &scratch, &mut journal, Some(&mut writer), &mut clock) {
             Ok(written) => self.finish(written, writer, clock),
-            Err(BuildError::Interrupted(_)) => {
+            Err(error @ (BuildError::Interrupted(_) | BuildError::Crew { .. })) => {
                 writer.keep();
                 scratch.keep(true);
-                Err(BuildError::Paused { scratch: scratch.path().to_owned() })
+                match error {
+                    BuildError::Interrupted(_) => Err(BuildError::Paused { scratch: scratch.path().to_owned() }),
+                    other => Err(other),
+                }
             }
             Err(error) => Err(error),
+        }
+    }
+
+    /// Goes through a conversion that another process leads, to the task that this one does there: of the step after
+    /// `steps` others.
+    pub fn task(&self, steps: u64) -> Result<(), BuildError> {
+        let path = scratch::path_for(self.output, self.settings);
+        let (mut scratch, mut journal) = Scratch::visit(path, steps)?;
+        let words = journal.step(Step::Begin, || Ok(Vec::new()))?;
+        let budget = words.get(1..).and_then(|words| Budget::take(&mut WordReader(words)));
+        let budget = budget.ok_or_else(|| journal.damaged())?;
+        if words != self.identity(&budget) {
+            return Err(BuildError::OtherTask { path: scratch.path().to_owned() });
+        }
+        scratch.name(words[0]);
+        let pool = pool(budget.threads)?;
+        match pool.install(|| self.write_bounded(budget, &scratch, &mut journal, None, &mut Clock::new())) {
+            Err(BuildError::TaskDone) => Ok(()),
+            Err(error) => Err(error),
+            Ok(_) => Err(BuildError::OtherTask { path: scratch.path().to_owned() }),
         }
     }
 
@@ -201,30 +240,26 @@ impl Conversion<'_> {
     fn begin(&self, budget: &Budget) -> Result<(Scratch, Journal, Writer), BuildError> {
         let partial = Writer::reserve(self.output)?;
         let path = scratch::path_for(self.output, self.settings);
-        if let Some((mut scratch, mut journal)) = scratch::earlier(&path, self.settings.resume)? {
-            match self.go_on(&mut journal, &scratch, partial, budget) {
-                Ok(Some(writer)) => {
-                    scratch.keep(false);
-                    return Ok((scratch, journal, writer));
-                }
-                // The file was finished, but the scratch folder was not removed any more.
-                Ok(None) => scratch.keep(false),
-                Err(error) => return Err(error),
+        let identity = self.identity(budget);
+        if let Some(mut journal) = scratch::earlier(&path, self.settings.resume)? {
+            if let Some(writer) = self.go_on(&mut journal, &path, partial, &identity)? {
+                return Ok((Scratch::of(path, identity[0], self.hands.are_many()), journal, writer));
             }
-            drop((journal, scratch));
-            return self.start(path, Writer::reserve(self.output)?, budget);
+            // The file was finished, but the scratch folder was not removed any more.
+            drop((journal, Scratch::of(path.clone(), identity[0], false)));
+            return self.start(path, Writer::reserve(self.output)?, identity);
         }
-        self.start(path, partial, budget)
+        self.start(path, partial, identity)
     }
 
     fn start(
         &self,
         path: std::path::PathBuf,
         partial: Partial,
-        budget: &Budget,
+        identity: Vec<u64>,
     ) -> Result<(Scratch, Journal, Writer), BuildError> {
-        let (scratch, mut journal) = Scratch::create(path)?;
-        journal.step(Step::Begin, || Ok(vec![self.fingerprint(budget)]))?;
+        let (scratch, mut journal) = Scratch::create(path, identity[0], self.hands.are_many())?;
+        journal.step(Step::Begin, || Ok(identity))?;
         Ok((scratch, journal, partial.start()?))
     }
 
@@ -232,14 +267,16 @@ impl Conversion<'_> {
     fn go_on(
         &self,
         journal: &mut Journal,
-        scratch: &Scratch,
+        scratch: &Path,
         partial: Partial,
-        budget: &Budget,
+        identity: &[u64],
     ) -> Result<Option<Writer>, BuildError> {
-        let fingerprint = self.fingerprint(budget);
-        if journal.step(Step::Begin, || Ok(vec![fingerprint]))? != [fingerprint] {
+        if self.hands.are_many() {
+            journal.share();
+        }
+        if journal.step(Step::Begin, || Ok(identity.to_vec()))? != identity {
             partial.keep();
-            return Err(BuildError::OtherConversion { path: scratch.path().to_owned() });
+            return Err(BuildError::OtherConversion { path: scratch.to_owned() });
         }
         match journal.written()? {
             Some(_) if partial.is_empty() => Ok(None),
@@ -251,14 +288,17 @@ impl Conversion<'_> {
         }
     }
 
-    /// A number that only the same conversion has.
-    fn fingerprint(&self, budget: &Budget) -> u64 {
+    /// A number that only the same conversion has, and the budget, which other processes need not come to by
+    /// themselves.
+    fn identity(&self, budget: &Budget) -> Vec<u64> {
         let settings = BuildSettings { resume: false, scratch: None, ..self.settings.clone() };
         let mut hash = Hash(Xxh3::new());
         // Hashing does not fail.
-        let version = (env!("CARGO_PKG_VERSION"), bricks::layout::VERSION);
+        let version = (env!("CARGO_PKG_VERSION"), bricks::layout::VERSION, self.hands.are_many());
         let _ = write!(hash, "{version:?} {budget:?} {settings:?} {:?}", self.outline);
-        hash.0.digest()
+        let mut words = Words::default();
+        budget.put(words.put(hash.0.digest()));
+        words.0
     }
 
     fn write_bounded(
@@ -266,18 +306,22 @@ impl Conversion<'_> {
         budget: Budget,
         scratch: &Scratch,
         journal: &mut Journal,
-        writer: &mut Writer,
+        mut writer: Option<&mut Writer>,
         clock: &mut Clock,
     ) -> Result<Written, BuildError> {
-        let Self { outline, plan, settings, progress, .. } = self;
-        let mut textures = Textures::default();
+        let Self { outline, plan, settings, hands, progress, .. } = self;
+        let hands = *hands;
+        // Only the process that leads writes the scene file, and only it comes to steps that do.
+        let other = || BuildError::OtherTask { path: scratch.path().to_owned() };
         let words = journal.step(Step::Textures, || {
+            let writer = writer.as_deref_mut().ok_or_else(other)?;
             // One at a time, for images may be large.
-            textures = mips::write(self.source, self.texture_settings(), 1, writer, progress)?;
+            let textures = mips::write(self.source, self.texture_settings(), 1, writer, progress)?;
             Ok(textures.to_words(writer.checkpoint()?))
         })?;
         let textures = Textures::from_words(&words, outline).ok_or_else(|| journal.damaged())?;
         let words = journal.step(Step::Opacity, || {
+            let writer = writer.as_deref_mut().ok_or_else(other)?;
             let opacities = self.write_opacity(&textures, writer)?;
             Ok(opacities.to_words(writer.checkpoint()?))
         })?;
@@ -285,12 +329,13 @@ impl Conversion<'_> {
         let mut warnings = textures.warnings.clone();
         clock.end("textures");
         let reader = Reader::lazy(self.source);
-        let bounded = Bounded { reader: &reader, plan, settings, budget, scratch, progress };
+        let bounded = Bounded { reader: &reader, plan, settings, budget, scratch, hands, progress };
         let cuts = bounded.cut(journal)?;
         let is_continued = journal.is_continued();
         let words = journal.step(Step::Repairs, || {
-            // Repairs are known once all parts have been read, and those of steps that an earlier run did have not.
-            if is_continued {
+            // Repairs are known once all parts have been read. Those of steps that an earlier run did, or other
+            // processes, have not; but the shards tell whether there are any.
+            if cuts.is_repaired && (is_continued || hands.are_many()) {
                 bounded.read_all()?;
             }
             Ok(journal::words_of_texts(&self.source.repairs()))
@@ -303,19 +348,19 @@ impl Conversion<'_> {
         let wants = textures.wants();
         let contexts = jobs::contexts(&lattices, &means, &opacity, &wants, settings);
         let jobs = jobs::jobs(cuts.objects.iter().map(|cut| cut.bricks.as_slice()))?;
-        let mut bricks = BrickWriter::new(writer, jobs.len(), cuts.objects.len(), budget.batch);
-        let by_disk = (&cuts, jobs.as_slice(), contexts.as_slice());
-        let rounded_away = if wants.iter().any(|wants| wants.details) {
-            write_bricks::<Detailed>(&bounded, by_disk, &mut bricks, journal, clock)?
+        let distribution = Distribution::new(&bounded, &jobs, &contexts);
+        let by_disk = (&distribution, &cuts);
+        let (bricks, rounded_away) = if wants.iter().any(|wants| wants.details) {
+            write_bricks::<Detailed>(by_disk, writer.as_deref_mut(), journal, clock)?
         } else {
-            write_bricks::<Plain>(&bounded, by_disk, &mut bricks, journal, clock)?
+            write_bricks::<Plain>(by_disk, writer.as_deref_mut(), journal, clock)?
         };
-        let (bricks, occupancy) = (bricks.records, bricks.occupancy);
+        let WrittenBricks { records: bricks, occupancy } = bricks;
         clock.end("bricks");
         let (cuts, used_materials) = (cuts.objects, cuts.materials);
         let (images, pieces) = ((textures, opacities, warnings), (cuts, used_materials, lattices));
         let mut written = Written::without_levels(images, pieces, (bricks, occupancy, rounded_away));
-        self.write_levels(&mut written, (writer, Some(journal)), budget.batch)?;
+        self.write_levels(&mut written, (writer, Some((scratch, journal))), budget.batch)?;
         clock.end("levels");
         Ok(written)
     }
@@ -381,19 +426,17 @@ impl Conversion<'_> {
     }
 }
 
-/// Brings triangles together on the disk as `T` and encodes them. Returns by object how many rounding leaves without
-/// area.
+/// Brings triangles together on the disk as `T` and encodes them. Returns the bricks, and by object how many triangles
+/// rounding leaves without area.
 fn write_bricks<T: Stored>(
-    bounded: &Bounded,
-    (cuts, jobs, contexts): (&BoundedCuts, &[Job], &[BrickContext]),
-    bricks: &mut BrickWriter,
+    (distribution, cuts): (&Distribution, &BoundedCuts),
+    writer: Option<&mut Writer>,
     journal: &mut Journal,
     clock: &mut Clock,
-) -> Result<Vec<u32>, BuildError> {
-    let (chunks, rounded_away) = bounded.distribute::<T>(cuts, jobs, contexts, journal)?;
+) -> Result<(WrittenBricks, Vec<u32>), BuildError> {
+    let rounded_away = distribution.distribute::<T>(cuts, journal)?;
     clock.end("distribute");
-    bounded.encode(jobs, chunks, contexts, bricks, journal)?;
-    Ok(rounded_away)
+    Ok((distribution.encode::<T>(writer, journal)?, rounded_away))
 }
 
 /// Encodes a brick of triangles whose geometry is in memory.
@@ -422,6 +465,11 @@ fn encode_loaded(
     let dropped = (slots.len() - triangles.len()) as u32;
     let count = triangles.len();
     ((count > 0).then(|| brick::encode(context, triangles.into_iter(), count)), dropped)
+}
+
+/// The threads of a conversion.
+pub(super) fn pool(threads: usize) -> Result<rayon::ThreadPool, BuildError> {
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK_BYTES).build()?)
 }
 
 /// Measures phases that follow each other.

@@ -183,6 +183,36 @@ pub enum BuildError {
         /// The scratch folder.
         path: std::path::PathBuf,
     },
+    /// Another process leads the conversion, and its journal is not as far as it should be.
+    #[error(
+        "{}: this journal does not have the steps before the task; let every worker see the folder of the scratch files",
+        path.display()
+    )]
+    Behind {
+        /// The journal.
+        path: std::path::PathBuf,
+    },
+    /// Another process leads the conversion, of something else.
+    #[error(
+        "{}: the conversion that is led from here has other inputs, options or another version than this worker; \
+         let every worker see the same files and have the same version",
+        path.display()
+    )]
+    OtherTask {
+        /// The scratch folder.
+        path: std::path::PathBuf,
+    },
+    /// Whoever does the tasks of a conversion failed; it can be continued.
+    #[error("{reason}; the same conversion with resume continues ({} is kept)", scratch.display())]
+    Crew {
+        /// What failed.
+        reason: String,
+        /// The scratch folder.
+        scratch: std::path::PathBuf,
+    },
+    /// The task that was asked for is done; [`super::do_task`] returns this to nobody.
+    #[error("the task is done")]
+    TaskDone,
     /// Somebody asked to stop.
     #[error(transparent)]
     Interrupted(#[from] crate::progress::Interrupted),

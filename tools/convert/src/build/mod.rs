@@ -23,10 +23,12 @@
 //! | `levels` | levels of detail: bricks that stand for others |
 //! | `assemble` | the resident part |
 //! | `bounded`, `disk` | the same for scenes that do not fit in memory |
+//! | `crew` | who does the costly steps of that: this process, or others |
 
 mod assemble;
 mod bounded;
 mod conversion;
+mod crew;
 mod cut;
 mod disk;
 mod encode;
@@ -38,6 +40,7 @@ mod texture;
 mod tree;
 mod triangles;
 
+pub use crew::{Crew, CrewError, TaskStep};
 pub use error::BuildError;
 pub use settings::{BuildSettings, BuildSummary, LatticeStep, TextureEncoding};
 pub use tree::wide::ITEM_COST as TRIANGLE_COST;
@@ -46,11 +49,9 @@ use crate::progress::Progress;
 use crate::source::{InMemory, Source, SourceScene};
 use bounded::budget::{self, Budget};
 use conversion::Conversion;
+use crew::Hands;
 use input::objects;
 use std::path::Path;
-
-/// Stack of a worker: the partition recurses, and a thread that waits takes up other work on the same stack.
-const STACK_BYTES: usize = 16 << 20;
 
 /// Builds a scene that lies in memory, see [`build_source`].
 pub fn build(
@@ -76,6 +77,57 @@ pub fn build_source(
     output: &Path,
     progress: &Progress,
 ) -> Result<BuildSummary, BuildError> {
+    run(source, settings, output, Hands::Own, progress, |conversion, threads, memory| {
+        let budget = Budget::divide(memory, threads, source, &conversion.plan, settings)?;
+        conversion::pool(budget.map_or(threads, |budget| budget.threads))?.install(|| match budget {
+            None => conversion.in_memory(),
+            Some(budget) => conversion.bounded(budget),
+        })
+    })
+}
+
+/// The same with the costly steps done by a `crew` of processes, for each of which `settings` say how much memory and
+/// how many threads it has. The bytes of the file are the same. All see the inputs, the scratch folder and that of the
+/// output under the same names.
+///
+/// After an error of the crew, or if `progress` is interrupted, what is done is left to be continued.
+pub fn build_shared(
+    source: &dyn Source,
+    settings: &BuildSettings,
+    output: &Path,
+    crew: &dyn Crew,
+    progress: &Progress,
+) -> Result<BuildSummary, BuildError> {
+    run(source, settings, output, Hands::Crew(crew), progress, |conversion, threads, memory| {
+        let budget = Budget::share(memory, threads, source, &conversion.plan, settings)?;
+        conversion::pool(budget.threads)?.install(|| conversion.bounded(budget))
+    })
+}
+
+/// Does a task of the step that [`Crew::perform`] calls `name`, which has `position` steps before it, of a conversion
+/// that another process leads with the same source, settings and output. Does nothing if it is done.
+///
+/// # Errors
+/// As [`build_source`]. The conversion is another one, or not as far as that.
+pub fn do_task(
+    source: &dyn Source,
+    settings: &BuildSettings,
+    output: &Path,
+    (name, position): (&str, u64),
+    task: u64,
+    progress: &Progress,
+) -> Result<(), BuildError> {
+    run(source, settings, output, Hands::Task(name, task), progress, |conversion, _, _| conversion.task(position))
+}
+
+fn run<T>(
+    source: &dyn Source,
+    settings: &BuildSettings,
+    output: &Path,
+    hands: Hands,
+    progress: &Progress,
+    convert: impl FnOnce(Conversion, usize, u64) -> Result<T, BuildError>,
+) -> Result<T, BuildError> {
     settings.check()?;
     let outline = source.outline();
     objects::check(outline)?;
@@ -83,14 +135,7 @@ pub fn build_source(
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = settings.threads.unwrap_or_else(cores);
     let memory = settings.memory_bytes.unwrap_or_else(budget::default_memory);
-    let budget = Budget::divide(memory, threads, source, &plan, settings)?;
-    let threads = budget.map_or(threads, |budget| budget.threads);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK_BYTES).build()?;
-    let conversion = Conversion { source, outline, plan, settings, output, progress };
-    let summary = pool.install(|| match budget {
-        None => conversion.in_memory(),
-        Some(budget) => conversion.bounded(budget),
-    });
+    let result = convert(Conversion { source, outline, plan, settings, output, hands, progress }, threads, memory);
     progress.finish();
-    summary
+    result
 }

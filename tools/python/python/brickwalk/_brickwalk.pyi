@@ -1,6 +1,6 @@
 """The extension module. The package wraps it; call that."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -89,5 +89,16 @@ def build_mesh(
     vertices: Rows, faces: NDArray[np.int64], out: str, brick_triangles: int, progress: Progress
 ) -> None: ...
 def convert(inputs: list[str], out: str, settings: dict[str, Any], progress: Progress) -> dict[str, Any]: ...
+def convert_shared(
+    inputs: list[str],
+    out: str,
+    settings: dict[str, Any],
+    perform: Callable[[str, int, int, list[int]], Iterable[object]],
+    progress: Progress,
+) -> dict[str, Any]: ...
 def pinhole(arguments: Camera, width: int, height: int) -> NDArray[np.float64]: ...
 def generate(kind: str, out: str, triangles: int, seed: int, progress: Progress) -> int: ...
+
+class ConversionWorker:
+    def __new__(cls, inputs: list[str], out: str, settings: dict[str, Any]) -> ConversionWorker: ...
+    def perform(self, step: str, position: int, task: int) -> None: ...

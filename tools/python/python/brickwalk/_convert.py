@@ -59,6 +59,20 @@ def convert(
     that is damaged.
     """
     settings = {name: value for name, value in locals().items() if name not in ("inputs", "out", "progress")}
+    names, target, settings = checked(inputs, out, progress, settings)
+    return _brickwalk.convert(names, target, settings, progress)
+
+
+def checked(
+    inputs: Path | Iterable[Path],
+    out: Path,
+    progress: Callable[[int, int], Any] | None,
+    settings: dict[str, Any],
+) -> tuple[list[str], str, dict[str, Any]]:
+    """The arguments of a conversion, as the extension takes them.
+
+    Raises as :func:`convert` for what can be known before anything is read.
+    """
     settings = {name: value for name, value in settings.items() if value is not None}
     check_progress(progress)
     paths = [inputs] if isinstance(inputs, (str, os.PathLike)) else list(inputs)
@@ -81,8 +95,9 @@ def convert(
     if not os.path.isdir(folder):
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), folder)
     if "movable" in settings:
-        settings["movable"] = [movable] if isinstance(movable, str) else list(movable or ())
-    return _brickwalk.convert(names, target, settings, progress)
+        movable = settings["movable"]
+        settings["movable"] = [movable] if isinstance(movable, str) else list(movable)
+    return names, target, settings
 
 
 def generate(

@@ -14,7 +14,8 @@
 
 use super::external::PackedItem;
 use crate::build::cut::partition::{CANONICAL_TRIANGLES, Item};
-use crate::build::disk::spill::BLOCK_RECORDS;
+use crate::build::disk::journal::{WordReader, Words};
+use crate::build::disk::shard::BLOCK_RECORDS;
 use crate::build::error::BuildError;
 use crate::build::input::objects::Plan;
 use crate::build::settings::BuildSettings;
@@ -71,6 +72,10 @@ const MOST_CHUNK: u64 = 1 << 21;
 /// Slots of a window beyond which larger ones are no faster; a conversion that is continued repeats at most one window.
 const MOST_WINDOW: u64 = 1 << 24;
 
+/// Items of a node that is cut in memory, and triangles of a chunk, where many processes share the work.
+const MOST_SHARED_ITEMS: u64 = 1 << 22;
+const MOST_SHARED_CHUNK: u64 = 1 << 19;
+
 /// Triangles a thread encodes before they are written, where there is room.
 const MOST_BATCH: u64 = 1 << 18;
 
@@ -122,6 +127,48 @@ impl Budget {
         plan: &Plan,
         settings: &BuildSettings,
     ) -> Result<Option<Self>, BuildError> {
+        let (needs, all) = Needs::of(threads, source, plan, settings);
+        if all <= memory { Ok(None) } else { needs.fit(memory, threads, all).map(Some) }
+    }
+
+    /// Divides the `memory` bytes of each of many processes that share the work. Pieces are small enough for all of
+    /// them to have some.
+    ///
+    /// # Errors
+    /// The least that a conversion takes is more.
+    pub fn share(
+        memory: u64,
+        threads: usize,
+        source: &dyn Source,
+        plan: &Plan,
+        settings: &BuildSettings,
+    ) -> Result<Self, BuildError> {
+        let (needs, _) = Needs::of(threads, source, plan, settings);
+        let budget = needs.fit(memory, threads, u64::MAX)?;
+        Ok(Self {
+            items: budget.items.min(MOST_SHARED_ITEMS.max(needs.least_items())),
+            chunk: budget.chunk.min(MOST_SHARED_CHUNK.max(needs.brick)),
+            ..budget
+        })
+    }
+
+    /// For the journal.
+    pub fn put(&self, words: &mut Words) {
+        let Self { threads, items, window, pending, chunk, batch } = *self;
+        words.put(threads as u64).put(items).put(window).put(pending as u64).put(chunk).put(batch as u64);
+    }
+
+    /// From the journal.
+    pub fn take(words: &mut WordReader) -> Option<Self> {
+        let (threads, items, window) = (words.take()? as usize, words.take()?, words.take()?);
+        let (pending, chunk, batch) = (words.take()? as usize, words.take()?, words.take()? as usize);
+        Some(Self { threads, items, window, pending, chunk, batch })
+    }
+}
+
+impl Needs {
+    /// Of a conversion, and the bytes that all of it takes at once.
+    fn of(threads: usize, source: &dyn Source, plan: &Plan, settings: &BuildSettings) -> (Self, u64) {
         let slots: u64 = plan.objects.iter().map(|object| u64::from(object.slots)).sum();
         let parts = plan.objects.iter().flat_map(|object| &object.parts);
         let has_details = source.outline().materials.iter().any(Material::needs_details);
@@ -135,7 +182,7 @@ impl Budget {
         };
         let brick = u64::from(settings.brick_triangles);
         let (occupancy, map) = if settings.proxies { (OCCUPANCY_WORK_BYTES, MAP_BYTES) } else { (0, 0) };
-        let needs = Needs {
+        let needs = Self {
             brick,
             part: u64::from(largest) * (part_bytes + making),
             run: u64::from(largest.min(PART_TRIANGLES)),
@@ -146,21 +193,21 @@ impl Budget {
             stored: if has_details { size_of::<Detailed>() } else { size_of::<Plain>() } as u64,
         };
         let all = needs.all_in_memory(threads as u64, slots, part_bytes);
-        if all <= memory {
-            return Ok(None);
-        }
-        let least = |threads: u64| RESERVE + needs.tables + needs.largest_phase(threads);
+        (needs, all)
+    }
+
+    /// Divides `memory` bytes by as many threads as there is room for; `all` would suffice anyway.
+    fn fit(&self, memory: u64, threads: usize, all: u64) -> Result<Budget, BuildError> {
+        let least = |threads: u64| RESERVE + self.tables + self.largest_phase(threads);
         let fitting = (1..=threads as u64).rev().find(|&threads| least(threads) <= memory);
         let Some(threads) = fitting else {
             let megabytes = least(1).min(all).div_ceil(1 << 20);
             let found = format!("{} MiB", memory >> 20);
             return Err(BuildError::Setting { setting: "--memory", found, expected: format!("{megabytes}M or more") });
         };
-        Ok(Some(needs.divide(memory - RESERVE - needs.tables, threads)))
+        Ok(self.divide(memory - RESERVE - self.tables, threads))
     }
-}
 
-impl Needs {
     /// Bytes with all geometry in memory.
     fn all_in_memory(&self, threads: u64, slots: u64, part_bytes: u64) -> u64 {
         let work =
@@ -202,6 +249,7 @@ impl Needs {
         items.max(distribution).max(encoding).max(threads * self.levels(self.brick.min(MOST_BATCH)))
     }
 
+    /// Divides what is left beside the tables.
     fn divide(&self, rest: u64, threads: u64) -> Budget {
         let items = rest - threads * self.collecting().max(BLOCK_BYTES);
         let per_thread = rest / (8 * threads);

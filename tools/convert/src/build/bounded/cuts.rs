@@ -1,13 +1,13 @@
 //! Cuts objects within a budget: small ones together in memory, large ones on the scratch disk until their nodes fit.
 
 use super::budget::{self, Budget};
-use super::external::{self, Node, PackedItem};
+use super::external::{self, Node};
+use crate::build::crew::{Hands, Tasks};
 use crate::build::cut::cuts::{ObjectCut, cut_object, extents};
 use crate::build::cut::gather::{self, Gathered};
 use crate::build::cut::partition::{self, Bounds, Rule};
 use crate::build::disk::journal::{Journal, Step, WordReader, Words};
 use crate::build::disk::scratch::Scratch;
-use crate::build::disk::spill::Spill;
 use crate::build::error::BuildError;
 use crate::build::input::objects::{ObjectPlan, Part, Piece, Plan};
 use crate::build::input::parts::Reader;
@@ -17,9 +17,6 @@ use crate::source::PART_TRIANGLES;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
-
-/// Name of the file of slots by brick.
-const ORDER: &str = "order";
 
 /// A conversion within a budget.
 pub(crate) struct Bounded<'a> {
@@ -33,6 +30,8 @@ pub(crate) struct Bounded<'a> {
     pub budget: Budget,
     /// Where.
     pub scratch: &'a Scratch,
+    /// By whom.
+    pub hands: Hands<'a>,
     /// Who watches.
     pub progress: &'a Progress,
 }
@@ -41,101 +40,142 @@ pub(crate) struct Bounded<'a> {
 pub(crate) struct BoundedCuts {
     /// By object, without their orders.
     pub objects: Vec<ObjectCut>,
-    /// The orders one after the other.
-    pub order: Spill<u32>,
+    /// Shards of the orders, one after the other.
+    pub order: Vec<String>,
     /// Which materials are used, a bit each.
     pub materials: Vec<u64>,
+    /// Whether something that was read for them was repaired.
+    pub is_repaired: bool,
 }
 
 /// What was cut so far.
+#[derive(Default)]
 struct Found {
-    cuts: BoundedCuts,
-    /// Bricks of the object at hand.
+    /// By object.
+    objects: BTreeMap<usize, ObjectCut>,
+    /// Shards of orders, by the first object in them.
+    order: BTreeMap<usize, Vec<String>>,
+    /// Which materials are used, a bit each.
+    materials: Vec<u64>,
+    is_repaired: bool,
+    /// Shards that were named.
+    names: u64,
+}
+
+/// What was cut so far of a large object.
+#[derive(Default)]
+struct Pieces {
     bricks: Vec<u32>,
-    /// Canonical extents of the object at hand.
+    /// Canonical extents.
     chunks: Vec<f64>,
-    /// Files that were named.
-    files: u64,
+    /// Shards of slots by brick.
+    order: Vec<String>,
 }
 
 impl Bounded<'_> {
-    /// Cuts all objects.
+    /// Cuts all objects: first the small ones, several at a time, then the large ones.
     pub fn cut(&self, journal: &mut Journal) -> Result<BoundedCuts, BuildError> {
         budget::give_back();
-        let slots = |object: &ObjectPlan| u64::from(object.slots);
         self.progress.phase("partition", self.plan.objects.iter().map(slots).sum());
-        let order = self.scratch.spill(ORDER, 0);
         let materials = Gathered::nothing(self.reader.outline().materials.len()).materials;
-        let cuts = BoundedCuts { objects: Vec::with_capacity(self.plan.objects.len()), order, materials };
-        let mut found = Found { cuts, bricks: Vec::new(), chunks: Vec::new(), files: 0 };
-        let mut first = 0;
-        while let Some(object) = self.plan.objects.get(first) {
+        let mut found = Found { materials, ..Found::default() };
+        let small = self.small();
+        for some in small.chunks(self.hands.at_once(small.len())) {
+            self.cut_small(some, &mut found, journal)?;
+        }
+        for (index, object) in self.plan.objects.iter().enumerate() {
             if slots(object) > self.budget.items {
-                self.cut_large(object, &mut found, journal)?;
-                first += 1;
-                continue;
+                self.cut_large(index, &mut found, journal)?;
             }
+        }
+        Ok(BoundedCuts {
+            objects: found.objects.into_values().collect(),
+            order: found.order.into_values().flatten().collect(),
+            materials: found.materials,
+            is_repaired: found.is_repaired,
+        })
+    }
+
+    /// Objects next to each other that fit in memory together.
+    fn small(&self) -> Vec<Range<usize>> {
+        let objects = &self.plan.objects;
+        let (mut small, mut first) = (Vec::new(), 0);
+        while first < objects.len() {
             let mut sum = 0;
             let fits = |object: &&ObjectPlan| {
                 sum += slots(object);
                 sum <= self.budget.items
             };
-            let end = first + self.plan.objects[first..].iter().take_while(fits).count();
-            self.cut_small(first..end, &mut found, journal)?;
-            first = end;
+            let count = objects[first..].iter().take_while(fits).count();
+            if count > 0 {
+                small.push(first..first + count);
+            }
+            first += count.max(1);
         }
-        Ok(found.cuts)
+        small
     }
 
-    /// Cuts objects that fit in memory together.
-    fn cut_small(&self, objects: Range<usize>, found: &mut Found, journal: &mut Journal) -> Result<(), BuildError> {
-        let objects = &self.plan.objects[objects];
-        let cuts = &mut found.cuts;
-        let words = journal.step(Step::Objects, || {
-            let cut = |object: &ObjectPlan| cut_object(self.reader, object, self.settings, self.progress);
-            let results: Vec<_> = objects.par_iter().map(cut).collect();
+    /// Cuts groups of objects, each of which fits in memory.
+    fn cut_small(&self, groups: &[Range<usize>], found: &mut Found, journal: &mut Journal) -> Result<(), BuildError> {
+        let names: Vec<String> = groups.iter().map(|_| found.next("order")).collect();
+        let words = journal.shared_step(Step::Objects, |position| {
             let mut words = Words::default();
-            for result in results {
-                let (cut, gathered) = result?;
-                cuts.order.append_all(&cut.order)?;
-                put_cut(&mut words, &cut.bricks, &cut.extents.chunks);
-                put_gathered(&mut words, &gathered);
-            }
-            words.put(cuts.order.length());
+            let tasks = Tasks {
+                step: Step::Objects,
+                position,
+                count: groups.len(),
+                shards: &|task| vec![names[task].clone()],
+                work: &|task| self.cut_group(&groups[task], &names[task]),
+            };
+            self.hands.perform(self.scratch, &tasks, &mut |task| {
+                self.note(self.plan.objects[groups[task].clone()].iter().map(slots).sum());
+                words.0.extend(self.scratch.shard(&names[task])?.facts());
+                Ok(())
+            })?;
             Ok(words.0)
         })?;
         let mut words = WordReader(&words);
-        for object in objects {
-            let read = take_cut(&mut words).zip(take_gathered(&mut words));
-            let ((bricks, chunks), gathered) = read.ok_or_else(|| journal.damaged())?;
-            found.cuts.push(object, bricks, chunks, &gathered);
+        for (group, name) in groups.iter().zip(names) {
+            for index in group.clone() {
+                let read = take_cut(&mut words).zip(take_gathered(&mut words));
+                let ((bricks, chunks), gathered) = read.ok_or_else(|| journal.damaged())?;
+                let pieces = Pieces { bricks, chunks, order: Vec::new() };
+                found.push(index, &self.plan.objects[index], pieces, &gathered);
+            }
+            found.order.insert(group.start, vec![name]);
+            found.is_repaired |= words.take().ok_or_else(|| journal.damaged())? != 0;
         }
-        let length = words.take().ok_or_else(|| journal.damaged())?;
-        found.cuts.order = self.scratch.spill(ORDER, length);
         Ok(())
     }
 
-    /// Cuts an object that does not fit in memory.
-    fn cut_large(&self, object: &ObjectPlan, found: &mut Found, journal: &mut Journal) -> Result<(), BuildError> {
-        let rule = Rule { limit: self.settings.brick_triangles as usize, is_object: true };
-        let number = found.next_file();
-        let words = journal.step(Step::Gather, || {
-            let items = self.items(number, 0);
-            let gathered = self.gather(object, &items)?;
-            let mut words = Words::default();
-            put_gathered(words.put(items.length()), &gathered);
-            Ok(words.0)
-        })?;
-        let mut words = WordReader(&words);
-        let read = words.take().zip(take_gathered(&mut words));
-        let (length, gathered) = read.ok_or_else(|| journal.damaged())?;
-        let root = Node { number, length, count: gathered.stored, centroids: gathered.centroids };
-        let large = self.cut_tree(root, rule, found, journal)?;
-        if large.count > 0 {
-            self.cut_tree(large, rule.of_large(), found, journal)?;
+    /// Cuts objects that fit in memory together into the shard `name` of their orders.
+    fn cut_group(&self, objects: &Range<usize>, name: &str) -> Result<(), BuildError> {
+        let objects = &self.plan.objects[objects.clone()];
+        let cut = |object: &ObjectPlan| cut_object(self.reader, object, self.settings, self.progress);
+        let results: Vec<_> = objects.par_iter().map(cut).collect();
+        let (shard, mut words) = (self.scratch.write(name)?, Words::default());
+        for result in results {
+            let (cut, gathered) = result?;
+            shard.append_all(0, &cut.order)?;
+            put_cut(&mut words, &cut.bricks, &cut.extents.chunks);
+            put_gathered(&mut words, &gathered);
         }
-        let (bricks, chunks) = (std::mem::take(&mut found.bricks), std::mem::take(&mut found.chunks));
-        found.cuts.push(object, bricks, chunks, &gathered);
+        words.put(self.has_repairs());
+        self.scratch.finish(shard, &words.0)
+    }
+
+    /// Cuts an object that does not fit in memory.
+    fn cut_large(&self, index: usize, found: &mut Found, journal: &mut Journal) -> Result<(), BuildError> {
+        let object = &self.plan.objects[index];
+        let rule = Rule { limit: self.settings.brick_triangles as usize, is_object: true };
+        let (root, gathered) = self.gather(object, found, journal)?;
+        let mut pieces = Pieces::default();
+        let large = self.cut_tree(root, rule, found, &mut pieces, journal)?;
+        if large.count > 0 {
+            self.cut_tree(large, rule.of_large(), found, &mut pieces, journal)?;
+        }
+        found.order.insert(index, std::mem::take(&mut pieces.order));
+        found.push(index, object, pieces, &gathered);
         Ok(())
     }
 
@@ -150,121 +190,225 @@ impl Bounded<'_> {
         })
     }
 
-    fn items(&self, number: u64, length: u64) -> Spill<PackedItem> {
-        self.scratch.spill(&format!("items-{number}"), length)
+    /// Whether this process has read something that was repaired.
+    fn has_repairs(&self) -> u64 {
+        u64::from(!self.reader.repairs().is_empty())
     }
 
-    /// Appends the items of an object to a file.
-    fn gather(&self, object: &ObjectPlan, items: &Spill<PackedItem>) -> Result<Gathered, BuildError> {
+    /// Notes so many steps that another process did.
+    pub fn note(&self, steps: u64) {
+        if self.hands.are_many() {
+            self.progress.advance(steps);
+        }
+    }
+
+    /// Collects the items of an object.
+    fn gather(
+        &self,
+        object: &ObjectPlan,
+        found: &mut Found,
+        journal: &mut Journal,
+    ) -> Result<(Node, Gathered), BuildError> {
+        let runs = object.runs(PART_TRIANGLES);
+        let groups: Vec<&[Vec<Piece>]> = runs.chunks(self.hands.runs_per_task(runs.len())).collect();
+        let names: Vec<String> = groups.iter().map(|_| found.next("items")).collect();
+        let words = journal.shared_step(Step::Gather, |position| {
+            let (mut all, mut is_repaired) = (Gathered::nothing(self.reader.outline().materials.len()), 0);
+            let tasks = Tasks {
+                step: Step::Gather,
+                position,
+                count: groups.len(),
+                shards: &|task| vec![names[task].clone()],
+                work: &|task| self.gather_runs(groups[task], &names[task]),
+            };
+            self.hands.perform(self.scratch, &tasks, &mut |task| {
+                let shard = self.scratch.shard(&names[task])?;
+                let mut facts = WordReader(shard.facts());
+                let read = take_gathered(&mut facts).zip(facts.take());
+                let (gathered, repaired) = read.ok_or_else(|| shard.damaged())?;
+                all.add(&gathered);
+                is_repaired |= repaired;
+                self.note(groups[task].iter().flatten().map(|piece| u64::from(piece.end - piece.first)).sum());
+                Ok(())
+            })?;
+            let mut words = Words::default();
+            put_gathered(&mut words, &all);
+            words.put(is_repaired);
+            Ok(words.0)
+        })?;
+        let mut words = WordReader(&words);
+        let read = take_gathered(&mut words).zip(words.take());
+        let (gathered, is_repaired) = read.ok_or_else(|| journal.damaged())?;
+        found.is_repaired |= is_repaired != 0;
+        Ok((Node { shards: names, count: gathered.stored, centroids: gathered.centroids }, gathered))
+    }
+
+    /// Collects the items of runs into the shard `name`.
+    fn gather_runs(&self, runs: &[Vec<Piece>], name: &str) -> Result<(), BuildError> {
+        let shard = self.scratch.write(name)?;
         let gather = |run: &Vec<_>| {
             let (found, gathered) = gather::gather(self.reader, run, self.settings.drop_non_finite, self.progress)?;
-            external::append(&found, items)?;
+            external::append(&found, &shard)?;
             Ok(gathered)
         };
-        let runs = object.runs(PART_TRIANGLES);
         let results: Vec<Result<Gathered, BuildError>> = runs.par_iter().with_max_len(1).map(gather).collect();
         let mut all = Gathered::nothing(self.reader.outline().materials.len());
         for result in results {
             all.add(&result?);
         }
-        Ok(all)
+        let mut words = Words::default();
+        put_gathered(&mut words, &all);
+        words.put(self.has_repairs());
+        self.scratch.finish(shard, &words.0)
     }
 
     /// Cuts the items below a node. Returns those that are too large for their parts, if the rule asks for that.
-    fn cut_tree(&self, root: Node, rule: Rule, found: &mut Found, journal: &mut Journal) -> Result<Node, BuildError> {
-        let mut large = Node { number: found.next_file(), length: 0, count: 0, centroids: Bounds::EMPTY };
-        let mut stack = vec![root];
+    fn cut_tree(
+        &self,
+        root: Node,
+        rule: Rule,
+        found: &mut Found,
+        pieces: &mut Pieces,
+        journal: &mut Journal,
+    ) -> Result<Node, BuildError> {
+        let (mut stack, mut leaves) = (vec![root], Vec::new());
         while let Some(node) = stack.pop() {
             self.progress.check()?;
             if node.count > self.budget.items {
-                // The left side is cut first.
+                // The left side comes first.
                 let [left, right] = self.split(&node, found, journal)?;
                 stack.extend([right, left]);
+                self.discard(&node);
             } else {
-                large = self.cut_node(&node, rule, large, found, journal)?;
+                leaves.push(node);
             }
-            self.items(node.number, 0).remove();
+        }
+        let mut large = Node { shards: Vec::new(), count: 0, centroids: Bounds::EMPTY };
+        for some in leaves.chunks(self.hands.at_once(leaves.len())) {
+            self.progress.check()?;
+            self.cut_nodes(some, rule, &mut large, (found, pieces), journal)?;
+            some.iter().for_each(|node| self.discard(node));
         }
         Ok(large)
     }
 
+    /// Removes the items of a node that are not needed any more.
+    fn discard(&self, node: &Node) {
+        if !self.hands.is_task() {
+            self.scratch.remove(&node.shards);
+        }
+    }
+
     fn split(&self, node: &Node, found: &mut Found, journal: &mut Journal) -> Result<[Node; 2], BuildError> {
-        let numbers = [found.next_file(), found.next_file()];
+        let names = [found.next("items"), found.next("items")];
         let words = journal.step(Step::Split, || {
-            let to = numbers.map(|number| self.items(number, 0));
-            let sides = external::split(node, &self.items(node.number, node.length), [&to[0], &to[1]])?;
+            let to = [self.scratch.write(&names[0])?, self.scratch.write(&names[1])?];
+            let sides = external::split(node, &self.scratch.blocks(&node.shards)?, [&to[0], &to[1]])?;
+            to.into_iter().try_for_each(|shard| self.scratch.finish(shard, &[]))?;
             let mut words = Words::default();
-            for ((count, centroids), to) in sides.into_iter().zip(&to) {
-                words.put(count).put(to.length()).put_point(centroids.min).put_point(centroids.max);
+            for (count, centroids) in sides {
+                words.put(count).put_point(centroids.min).put_point(centroids.max);
             }
             Ok(words.0)
         })?;
         let mut words = WordReader(&words);
-        let mut side = |number| {
-            let (count, length) = (words.take()?, words.take()?);
+        let mut side = |name| {
+            let count = words.take()?;
             let centroids = Bounds { min: words.take_point()?, max: words.take_point()? };
-            Some(Node { number, length, count, centroids })
+            Some(Node { shards: vec![name], count, centroids })
         };
-        let sides = side(numbers[0]).zip(side(numbers[1]));
+        let [left, right] = names;
+        let sides = side(left).zip(side(right));
         sides.map(|(left, right)| [left, right]).ok_or_else(|| journal.damaged())
     }
 
-    /// Cuts a node that fits in memory; adds to the large items.
-    fn cut_node(
+    /// Cuts nodes that fit in memory; adds to the large items.
+    fn cut_nodes(
         &self,
-        node: &Node,
+        nodes: &[Node],
         rule: Rule,
-        large: Node,
-        found: &mut Found,
+        large: &mut Node,
+        (found, pieces): (&mut Found, &mut Pieces),
         journal: &mut Journal,
-    ) -> Result<Node, BuildError> {
-        let words = journal.step(Step::Cut, || {
-            budget::give_back();
-            let mut items = external::load(&self.items(node.number, node.length))?;
-            let cuts = partition::cut(&mut items, rule);
-            drop(items);
-            found.cuts.order.append_all(&cuts.order)?;
-            let spill = self.items(large.number, large.length);
-            external::append(&cuts.large, &spill)?;
+    ) -> Result<(), BuildError> {
+        let names: Vec<[String; 2]> = nodes.iter().map(|_| [found.next("order"), found.next("large")]).collect();
+        let words = journal.shared_step(Step::Cut, |position| {
             let mut words = Words::default();
-            let centroids = large.centroids.union(partition::bounds(&cuts.large).1);
-            words.put(found.cuts.order.length()).put(spill.length()).put(large.count + cuts.large.len() as u64);
-            words.put_point(centroids.min).put_point(centroids.max);
-            put_cut(&mut words, &cuts.parts, &cuts.extents);
+            let tasks = Tasks {
+                step: Step::Cut,
+                position,
+                count: nodes.len(),
+                shards: &|task| names[task].to_vec(),
+                work: &|task| self.cut_node(&nodes[task], rule, &names[task]),
+            };
+            self.hands.perform(self.scratch, &tasks, &mut |task| {
+                words.0.extend(self.scratch.shard(&names[task][0])?.facts());
+                Ok(())
+            })?;
             Ok(words.0)
         })?;
         let mut words = WordReader(&words);
-        let mut read = || {
-            let (order, length, count) = (words.take()?, words.take()?, words.take()?);
-            let centroids = Bounds { min: words.take_point()?, max: words.take_point()? };
-            Some((order, Node { length, count, centroids, ..large }, take_cut(&mut words)?))
-        };
-        let (order, large, (bricks, chunks)) = read().ok_or_else(|| journal.damaged())?;
-        found.cuts.order = self.scratch.spill(ORDER, order);
-        found.bricks.extend(bricks);
-        found.chunks.extend(chunks);
-        Ok(large)
+        for [order, large_items] in names {
+            let mut read = || {
+                let count = words.take()?;
+                let centroids = Bounds { min: words.take_point()?, max: words.take_point()? };
+                Some((count, centroids, take_cut(&mut words)?))
+            };
+            let (count, centroids, (bricks, chunks)) = read().ok_or_else(|| journal.damaged())?;
+            large.shards.push(large_items);
+            large.count += count;
+            large.centroids = large.centroids.union(centroids);
+            pieces.order.push(order);
+            pieces.bricks.extend(bricks);
+            pieces.chunks.extend(chunks);
+        }
+        Ok(())
     }
-}
 
-impl BoundedCuts {
-    fn push(&mut self, object: &ObjectPlan, bricks: Vec<u32>, chunks: Vec<f64>, gathered: &Gathered) {
-        self.materials.iter_mut().zip(&gathered.materials).for_each(|(own, other)| *own |= other);
-        self.objects.push(ObjectCut {
-            order: Vec::new(),
-            bricks,
-            extents: extents(object, chunks, &gathered.bounds),
-            zero_area: gathered.zero_area,
-            non_finite: gathered.non_finite,
-        });
+    /// Cuts a node that fits in memory into two shards: its order and its large items.
+    fn cut_node(&self, node: &Node, rule: Rule, [order, large]: &[String; 2]) -> Result<(), BuildError> {
+        budget::give_back();
+        let mut items = external::load(&self.scratch.blocks(&node.shards)?)?;
+        if items.len() as u64 != node.count {
+            return Err(self.scratch.damaged(node.shards.first().map_or("", String::as_str)));
+        }
+        let cuts = partition::cut(&mut items, rule);
+        drop(items);
+        let shard = self.scratch.write(large)?;
+        external::append(&cuts.large, &shard)?;
+        self.scratch.finish(shard, &[])?;
+        let shard = self.scratch.write(order)?;
+        shard.append_all(0, &cuts.order)?;
+        let mut words = Words::default();
+        let centroids = partition::bounds(&cuts.large).1;
+        words.put(cuts.large.len() as u64).put_point(centroids.min).put_point(centroids.max);
+        put_cut(&mut words, &cuts.parts, &cuts.extents);
+        self.scratch.finish(shard, &words.0)
     }
 }
 
 impl Found {
-    fn next_file(&mut self) -> u64 {
-        self.files += 1;
-        self.files
+    fn push(&mut self, index: usize, object: &ObjectPlan, pieces: Pieces, gathered: &Gathered) {
+        self.materials.iter_mut().zip(&gathered.materials).for_each(|(own, other)| *own |= other);
+        let cut = ObjectCut {
+            order: Vec::new(),
+            bricks: pieces.bricks,
+            extents: extents(object, pieces.chunks, &gathered.bounds),
+            zero_area: gathered.zero_area,
+            non_finite: gathered.non_finite,
+        };
+        self.objects.insert(index, cut);
     }
+
+    /// A name for a shard of a kind.
+    fn next(&mut self, kind: &str) -> String {
+        self.names += 1;
+        format!("{kind}-{}", self.names)
+    }
+}
+
+fn slots(object: &ObjectPlan) -> u64 {
+    u64::from(object.slots)
 }
 
 fn put_cut(words: &mut Words, bricks: &[u32], chunks: &[f64]) {

@@ -1,30 +1,32 @@
-//! Brings the triangles of neighbouring bricks together on the scratch disk, and encodes them chunk by chunk.
+//! Brings the triangles of neighbouring bricks together on the scratch disk.
+//!
+//! Bricks are taken together in *chunks*, and chunks in *groups*. A task reads some runs of the source and writes a
+//! shard for each group, whose blocks are labelled with chunks. Whoever encodes a chunk reads its blocks from the shards
+//! of all tasks. A shard goes when the last chunk of its group is encoded.
 
 use super::budget;
 use super::cuts::{Bounded, BoundedCuts};
+use crate::build::crew::Tasks;
 use crate::build::disk::journal::{Journal, Step, WordReader, Words};
-use crate::build::disk::spill::Spill;
-use crate::build::encode::brick::{self, BrickContext};
-use crate::build::encode::jobs::{BrickWriter, Job};
+use crate::build::disk::shard::ShardWriter;
+use crate::build::encode::brick::BrickContext;
+use crate::build::encode::jobs::Job;
 use crate::build::error::BuildError;
 use crate::build::input::objects::{Piece, Placed};
 use crate::build::triangles::triangle::{Stored, Triangle};
 use crate::source::PART_TRIANGLES;
-use bricks::{Brick, Occupancy, Span};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::sync_channel;
 
 /// No brick.
 const NONE: u32 = u32::MAX;
 
-/// Runs of consecutive bricks, each with a file of triangles.
-pub(crate) struct Chunks<T> {
-    /// Bricks of each.
-    jobs: Vec<Range<usize>>,
-    files: Vec<Spill<T>>,
-}
+/// Shards that a task writes at most: more are sooner removed, fewer are sooner opened.
+const MOST_GROUPS: usize = 16;
+
+/// Slots of a block of the bricks of a window.
+const SLOT_BLOCK: usize = 1 << 16;
 
 /// A run of triangles within all objects.
 struct Run<'a> {
@@ -35,115 +37,158 @@ struct Run<'a> {
     slots: u64,
 }
 
-impl Bounded<'_> {
-    /// Appends all triangles to the files of their chunks. Returns those and by object the number of triangles that
-    /// rounding leaves without area.
-    pub fn distribute<T: Stored>(
-        &self,
-        cuts: &BoundedCuts,
-        jobs: &[Job],
-        contexts: &[BrickContext],
-        journal: &mut Journal,
-    ) -> Result<(Chunks<T>, Vec<u32>), BuildError> {
+/// How triangles are distributed over chunks of bricks.
+pub(crate) struct Distribution<'a> {
+    pub(super) bounded: &'a Bounded<'a>,
+    pub(super) jobs: &'a [Job],
+    pub(super) contexts: &'a [BrickContext<'a>],
+    /// Bricks of each chunk.
+    pub(super) chunks: Vec<Range<usize>>,
+    runs: Vec<Run<'a>>,
+    /// Runs of each window.
+    windows: Vec<Range<usize>>,
+    chunk_of: Vec<u32>,
+    groups: usize,
+}
+
+/// The bricks of the slots of a window.
+enum WindowBricks {
+    /// In memory, from its first slot on.
+    Loaded(Vec<u32>),
+    /// In its shard.
+    Stored,
+}
+
+impl<'a> Distribution<'a> {
+    /// Of these bricks; nothing is done yet.
+    pub fn new(bounded: &'a Bounded<'a>, jobs: &'a [Job], contexts: &'a [BrickContext<'a>]) -> Self {
+        let chunks = chunks(jobs, bounded.budget.chunk);
+        let chunk_of = (0u32..).zip(&chunks).flat_map(|(chunk, jobs)| jobs.clone().map(move |_| chunk)).collect();
+        let groups = chunks.len().min(MOST_GROUPS);
+        let runs = runs(bounded);
+        let windows = windows(&runs, bounded.budget.window);
+        Self { bounded, jobs, contexts, chunks, runs, windows, chunk_of, groups }
+    }
+
+    /// Writes all triangles into shards. Returns by object the number of triangles that rounding leaves without area.
+    pub fn distribute<T: Stored>(&self, cuts: &BoundedCuts, journal: &mut Journal) -> Result<Vec<u32>, BuildError> {
         budget::give_back();
-        let mut chunks = self.chunks(jobs);
-        let chunk_of: Vec<u32> =
-            (0u32..).zip(&chunks.jobs).flat_map(|(chunk, jobs)| jobs.clone().map(move |_| chunk)).collect();
-        let runs = self.runs();
-        self.progress.phase("distribute", runs.iter().map(|run| run.slots).sum());
-        let mut dropped = vec![0u32; contexts.len()];
-        let mut rest = runs.as_slice();
-        while let Some(first) = rest.first() {
-            let count = rest.iter().take_while(|run| run.first + run.slots - first.first <= self.budget.window).count();
-            let (window, after) = rest.split_at(count.max(1));
-            rest = after;
-            let words = journal.step(Step::Distribute, || {
-                let more: Vec<AtomicU32> = contexts.iter().map(|_| AtomicU32::new(0)).collect();
-                let brick_of = self.brick_of(window, cuts, jobs)?;
-                let append = |run: &Run| -> Result<(), BuildError> {
-                    let bricks = &brick_of[(run.first - first.first) as usize..][..run.slots as usize];
-                    let lost = self.distribute_run(run, bricks, &chunk_of, &contexts[run.object], &chunks)?;
-                    more[run.object].fetch_add(lost, Ordering::Relaxed);
-                    Ok(())
+        let Bounded { scratch, hands, progress, .. } = self.bounded;
+        progress.phase("distribute", self.runs.iter().map(|run| run.slots).sum());
+        let mut dropped = vec![0u32; self.contexts.len()];
+        for (window, runs) in self.windows.iter().enumerate() {
+            let words = journal.shared_step(Step::Distribute, |position| {
+                let mut more = vec![0u64; dropped.len()];
+                let bricks = self.window_bricks(window, cuts)?;
+                let tasks = Tasks {
+                    step: Step::Distribute,
+                    position,
+                    count: self.tasks(window),
+                    shards: &|task| (0..self.groups).map(|group| name(window, task, group)).collect(),
+                    work: &|task| self.task::<T>(window, task, &bricks),
                 };
-                window.par_iter().with_max_len(1).try_for_each(append)?;
+                hands.perform(scratch, &tasks, &mut |task| {
+                    // All shards of the task must be there; the first says what was dropped.
+                    for group in (0..self.groups).rev() {
+                        let shard = scratch.shard(&name(window, task, group))?;
+                        if group == 0 {
+                            let lost = take_dropped(shard.facts(), more.len()).ok_or_else(|| shard.damaged())?;
+                            lost.into_iter().for_each(|(object, lost)| more[object] += lost);
+                        }
+                    }
+                    let own = self.task_runs(window, task);
+                    self.bounded.note(self.runs[own].iter().map(|run| run.slots).sum());
+                    Ok(())
+                })?;
                 let mut words = Words::default();
-                words.put_all(chunks.files.iter().map(Spill::length));
-                words.put_all(more.into_iter().map(|more| u64::from(more.into_inner())));
+                words.put(runs.len() as u64).put_all(more.into_iter());
                 Ok(words.0)
             })?;
             let mut words = WordReader(&words);
-            let (lengths, more) = words.take_all().zip(words.take_all()).ok_or_else(|| journal.damaged())?;
-            if lengths.len() != chunks.files.len() || more.len() != dropped.len() {
-                return Err(journal.damaged());
-            }
-            chunks.files = (0..).zip(lengths).map(|(chunk, length)| self.chunk_file(chunk, length)).collect();
+            let read = words.take().zip(words.take_all());
+            let known = read.filter(|(count, more)| *count == runs.len() as u64 && more.len() == dropped.len());
+            let (_, more) = known.ok_or_else(|| journal.damaged())?;
             dropped.iter_mut().zip(more).for_each(|(dropped, more)| *dropped += more as u32);
         }
-        Ok((chunks, dropped))
+        Ok(dropped)
     }
 
-    fn chunk_file<T: Stored>(&self, chunk: usize, length: u64) -> Spill<T> {
-        self.scratch.spill(&format!("chunk-{chunk}"), length)
+    /// The names of all shards with triangles of a chunk, and of which task of which window each is.
+    pub(super) fn shards(&self, chunk: usize) -> impl Iterator<Item = (String, usize, usize)> {
+        let group = self.group(chunk);
+        let tasks = (0..self.windows.len()).flat_map(|window| (0..self.tasks(window)).map(move |task| (window, task)));
+        tasks.map(move |(window, task)| (name(window, task, group), window, task))
     }
 
-    /// Chunks of as many bricks as the budget allows, without files yet.
-    fn chunks<T: Stored>(&self, jobs: &[Job]) -> Chunks<T> {
-        let mut chunks = Chunks { jobs: Vec::new(), files: Vec::new() };
-        let (mut start, mut triangles) = (0, 0);
-        for (index, job) in jobs.iter().enumerate() {
-            triangles += job.count as u64;
-            if triangles >= self.budget.chunk || index + 1 == jobs.len() {
-                chunks.files.push(self.chunk_file(chunks.jobs.len(), 0));
-                chunks.jobs.push(start..index + 1);
-                (start, triangles) = (index + 1, 0);
-            }
+    /// Whether no later chunk has its triangles in the same shards.
+    pub(super) fn is_last_of_group(&self, chunk: usize) -> bool {
+        chunk + 1 == self.chunks.len() || self.group(chunk + 1) != self.group(chunk)
+    }
+
+    /// Writes the shards of a task again, whose input is still there if many processes do the work.
+    pub(super) fn again<T: Stored>(&self, window: usize, task: usize) -> Result<(), BuildError> {
+        self.task::<T>(window, task, &WindowBricks::Stored)
+    }
+
+    fn group(&self, chunk: usize) -> usize {
+        chunk * self.groups / self.chunks.len()
+    }
+
+    fn runs_per_task(&self, window: usize) -> usize {
+        self.bounded.hands.runs_per_task(self.windows[window].len())
+    }
+
+    fn tasks(&self, window: usize) -> usize {
+        self.windows[window].len().div_ceil(self.runs_per_task(window))
+    }
+
+    /// The runs of a task.
+    fn task_runs(&self, window: usize, task: usize) -> Range<usize> {
+        let (runs, length) = (&self.windows[window], self.runs_per_task(window));
+        let first = runs.start + task * length;
+        first..runs.end.min(first + length)
+    }
+
+    /// The bricks of the slots of a window; where other processes need them, in a shard.
+    fn window_bricks(&self, window: usize, cuts: &BoundedCuts) -> Result<WindowBricks, BuildError> {
+        let Bounded { scratch, hands, .. } = self.bounded;
+        if hands.is_task() {
+            return Ok(WindowBricks::Stored);
         }
-        chunks
+        let brick_of = self.brick_of(&self.runs[self.windows[window].clone()], cuts)?;
+        if !hands.are_many() {
+            return Ok(WindowBricks::Loaded(brick_of));
+        }
+        let shard = scratch.write(&bricks_name(window))?;
+        brick_of.chunks(SLOT_BLOCK).try_for_each(|slots| shard.append(0, slots).map(drop))?;
+        scratch.finish(shard, &[])?;
+        Ok(WindowBricks::Stored)
     }
 
-    fn runs(&self) -> Vec<Run<'_>> {
-        let mut first = 0;
-        let runs = self
-            .plan
-            .objects
-            .iter()
-            .enumerate()
-            .flat_map(|(object, plan)| plan.runs(PART_TRIANGLES).into_iter().map(move |pieces| (object, pieces)));
-        runs.map(|(object, pieces)| {
-            let slots = pieces.iter().map(|piece| u64::from(piece.end - piece.first)).sum();
-            first += slots;
-            Run { object, pieces, first: first - slots, slots }
-        })
-        .collect()
-    }
-
-    /// The bricks, by index among all, of the slots of a window.
-    fn brick_of(&self, window: &[Run], cuts: &BoundedCuts, jobs: &[Job]) -> Result<Vec<u32>, BuildError> {
-        let start = window[0].first;
-        let end = window[window.len() - 1].first + window[window.len() - 1].slots;
+    /// The bricks, by index among all, of the slots of runs that follow each other.
+    fn brick_of(&self, runs: &[Run], cuts: &BoundedCuts) -> Result<Vec<u32>, BuildError> {
+        let start = runs.first().map_or(0, |run| run.first);
+        let end = runs.last().map_or(start, |run| run.first + run.slots);
         let mut brick_of = vec![NONE; (end - start) as usize];
-        let bases: Vec<u64> = self
-            .plan
-            .objects
-            .iter()
-            .scan(0, |base, object| {
-                *base += u64::from(object.slots);
-                Some(*base - u64::from(object.slots))
+        let slots = self.bounded.plan.objects.iter().map(|object| u64::from(object.slots));
+        let bases: Vec<u64> = slots
+            .scan(0, |base, slots| {
+                *base += slots;
+                Some(*base - slots)
             })
             .collect();
-        let blocks = cuts.order.blocks()?;
-        let (mut job, mut left, mut slots) = (0, jobs.first().map_or(0, |job| job.count), Vec::new());
+        let blocks = self.bounded.scratch.blocks::<u32>(&cuts.order)?;
+        let (mut job, mut left, mut slots) = (0, self.jobs.first().map_or(0, |job| job.count), Vec::new());
         for block in 0..blocks.len() {
             slots.clear();
             blocks.read(block, &mut slots)?;
             for &slot in &slots {
                 while left == 0 {
                     job += 1;
-                    left = jobs.get(job).ok_or_else(|| cuts.order.damaged())?.count;
+                    left = self.jobs.get(job).ok_or_else(|| blocks.damaged(block))?.count;
                 }
                 left -= 1;
-                let place = (bases[jobs[job].object as usize] + u64::from(slot)).checked_sub(start);
+                let place = (bases[self.jobs[job].object as usize] + u64::from(slot)).checked_sub(start);
                 if let Some(brick) = place.and_then(|place| brick_of.get_mut(place as usize)) {
                     *brick = job as u32;
                 }
@@ -152,20 +197,64 @@ impl Bounded<'_> {
         Ok(brick_of)
     }
 
-    /// Appends the triangles of a run; `bricks` are those of its slots. Returns how many rounding leaves without area.
-    fn distribute_run<T: Stored>(
-        &self,
-        run: &Run,
-        bricks: &[u32],
-        chunk_of: &[u32],
-        context: &BrickContext,
-        chunks: &Chunks<T>,
-    ) -> Result<u32, BuildError> {
-        self.progress.check()?;
-        let mut pending: Vec<Vec<T>> = vec![Vec::new(); chunks.files.len()];
+    /// The bricks of so many slots of a window from `first` on, counted from its first, from its shard.
+    fn stored_bricks(&self, window: usize, first: usize, count: usize) -> Result<Vec<u32>, BuildError> {
+        let blocks = self.bounded.scratch.blocks::<u32>(&[bricks_name(window)])?;
+        let (start, mut bricks) = (first / SLOT_BLOCK, Vec::with_capacity(count + 2 * SLOT_BLOCK));
+        (start..(first + count).div_ceil(SLOT_BLOCK).min(blocks.len()))
+            .try_for_each(|block| blocks.read(block, &mut bricks))?;
+        let own = first - start * SLOT_BLOCK;
+        let found = bricks.get(own..own + count).ok_or_else(|| blocks.damaged(start))?;
+        Ok(found.to_vec())
+    }
+
+    /// Writes the triangles of the runs of a task.
+    fn task<T: Stored>(&self, window: usize, task: usize, bricks: &WindowBricks) -> Result<(), BuildError> {
+        let scratch = self.bounded.scratch;
+        let runs = &self.runs[self.task_runs(window, task)];
+        let start = runs.first().map_or(0, |run| run.first);
+        let slots: u64 = runs.iter().map(|run| run.slots).sum();
+        let first = (start - self.runs[self.windows[window].start].first) as usize;
+        let stored;
+        let bricks = match bricks {
+            WindowBricks::Loaded(all) => &all[first..][..slots as usize],
+            WindowBricks::Stored => {
+                stored = self.stored_bricks(window, first, slots as usize)?;
+                &stored[..]
+            }
+        };
+        let shards = (0..self.groups).map(|group| scratch.write(&name(window, task, group)));
+        let shards = shards.collect::<Result<Vec<ShardWriter>, _>>()?;
+        let dropped: Vec<AtomicU32> = self.contexts.iter().map(|_| AtomicU32::new(0)).collect();
+        runs.par_iter().with_max_len(1).try_for_each(|run| {
+            let own = &bricks[(run.first - start) as usize..][..run.slots as usize];
+            let lost = self.distribute_run::<T>(run, own, &shards)?;
+            dropped[run.object].fetch_add(lost, Ordering::Relaxed);
+            Ok::<_, BuildError>(())
+        })?;
+        let mut words = Words::default();
+        for (object, lost) in (0u64..).zip(dropped) {
+            let lost = lost.into_inner();
+            if lost > 0 {
+                words.put(object).put(lost.into());
+            }
+        }
+        // The first shard goes last: what it says is of a task whose shards are all there.
+        for (group, shard) in shards.into_iter().enumerate().rev() {
+            scratch.finish(shard, if group == 0 { &words.0 } else { &[] })?;
+        }
+        Ok(())
+    }
+
+    /// Writes the triangles of a run; `bricks` are those of its slots. Returns how many rounding leaves without area.
+    fn distribute_run<T: Stored>(&self, run: &Run, bricks: &[u32], shards: &[ShardWriter]) -> Result<u32, BuildError> {
+        let Bounded { reader, budget, progress, .. } = self.bounded;
+        progress.check()?;
+        let context = &self.contexts[run.object];
+        let mut pending: Vec<Vec<T>> = vec![Vec::new(); self.chunks.len()];
         let (mut count, mut dropped, mut slots) = (0, 0, bricks.iter());
         for piece in &run.pieces {
-            let primitive = self.reader.get(piece)?;
+            let primitive = reader.get(piece)?;
             let placed = Placed { part: piece.part, primitive: &primitive };
             let wants = context.wants[primitive.material as usize];
             for (triangle, &brick) in (piece.first..piece.end).zip(&mut slots) {
@@ -173,120 +262,82 @@ impl Bounded<'_> {
                     continue;
                 }
                 match Triangle::round(&placed, triangle, &context.lattice, brick, wants) {
-                    Some(triangle) => pending[chunk_of[brick as usize] as usize].push(T::of(&triangle)),
+                    Some(triangle) => pending[self.chunk_of[brick as usize] as usize].push(T::of(&triangle)),
                     None => dropped += 1,
                 }
                 count += 1;
-                if count == self.budget.pending {
-                    append(&mut pending, chunks)?;
+                if count == budget.pending {
+                    self.append(&mut pending, shards)?;
                     count = 0;
                 }
             }
         }
-        append(&mut pending, chunks)?;
-        self.progress.advance(run.slots);
+        self.append(&mut pending, shards)?;
+        progress.advance(run.slots);
         Ok(dropped)
     }
 
-    /// Encodes and writes the bricks of all chunks. While one is encoded the next is read.
-    pub fn encode<T: Stored>(
-        &self,
-        jobs: &[Job],
-        chunks: Chunks<T>,
-        contexts: &[BrickContext],
-        bricks: &mut BrickWriter,
-        journal: &mut Journal,
-    ) -> Result<(), BuildError> {
-        budget::give_back();
-        self.progress.phase("bricks", jobs.iter().map(|job| job.count as u64).sum());
-        let Chunks { jobs: ranges, files } = chunks;
-        let done = ranges.len().min(journal.left());
-        for range in &ranges[..done] {
-            let words = journal.step(Step::Encode, || Ok(Vec::new()))?;
-            let (records, occupancy) = take_written(&words).ok_or_else(|| journal.damaged())?;
-            bricks.records.extend(records);
-            bricks.occupancy.extend(occupancy);
-            self.progress.advance(jobs[range.clone()].iter().map(|job| job.count as u64).sum());
+    /// Appends what is pending to the shards of its chunks.
+    fn append<T: Stored>(&self, pending: &mut [Vec<T>], shards: &[ShardWriter]) -> Result<(), BuildError> {
+        for (chunk, triangles) in pending.iter_mut().enumerate() {
+            // The memory is given back too: the next triangles may be of other chunks.
+            shards[self.group(chunk)].append(chunk as u64, &std::mem::take(triangles))?;
         }
-        std::thread::scope(|scope| {
-            // The other end goes with this closure, so that the thread ends after an error too.
-            let (sender, receiver) = sync_channel(0);
-            let rest = files.into_iter().zip(&ranges).skip(done);
-            let read_ahead = move || {
-                for (file, range) in rest {
-                    if sender.send((range, Loaded::load(&file).map(|loaded| (file, loaded)))).is_err() {
-                        break;
-                    }
-                }
-            };
-            std::thread::Builder::new().spawn_scoped(scope, read_ahead).map_err(BuildError::ReadAhead)?;
-            for (range, loaded) in receiver {
-                let (file, loaded) = loaded?;
-                let (first, first_occupancy) = (bricks.records.len(), bricks.occupancy.len());
-                journal.step(Step::Encode, || {
-                    let encode = |job: &Job| {
-                        let (triangles, count) = loaded.brick(job.index);
-                        let context = &contexts[job.object as usize];
-                        // What has no area was counted before.
-                        ((count > 0).then(|| brick::encode(context, triangles, count)), 0)
-                    };
-                    bricks.write(&jobs[range.clone()], encode, self.progress)?;
-                    let records = &bricks.records[first..];
-                    let spans: Vec<Span> = records
-                        .iter()
-                        .flat_map(|record| [record.geometry, record.attributes, record.proxies])
-                        .filter(|span| *span != Span::default())
-                        .collect();
-                    let mut words = Words::default();
-                    words.put(bricks.writer.checkpoint()?).put_records(&spans).put_records(records);
-                    words.put_records(&bricks.occupancy[first_occupancy..]);
-                    Ok(words.0)
-                })?;
-                file.remove();
-            }
-            Ok(())
-        })
+        Ok(())
     }
 }
 
-/// The records of a chunk and their occupancy from the journal; see [`Journal::written`] for what comes before them.
-fn take_written(words: &[u64]) -> Option<(Vec<Brick>, Vec<Occupancy>)> {
-    let mut words = WordReader(words);
-    words.take()?;
-    words.take_records::<Span>()?;
-    Some((words.take_records()?, words.take_records()?))
+/// The name of a shard of triangles.
+fn name(window: usize, task: usize, group: usize) -> String {
+    format!("triangles-{window}-{task}-{group}")
 }
 
-/// The triangles of a chunk.
-struct Loaded<T> {
-    triangles: Vec<T>,
-    /// Brick and id of each triangle and its place, ascending.
-    order: Vec<(u64, u32)>,
+/// The name of the shard of the bricks of the slots of a window.
+fn bricks_name(window: usize) -> String {
+    format!("bricks-{window}")
 }
 
-impl<T: Stored> Loaded<T> {
-    fn load(file: &Spill<T>) -> Result<Self, BuildError> {
-        let blocks = file.blocks()?;
-        let mut triangles = Vec::with_capacity(blocks.records() as usize);
-        (0..blocks.len()).try_for_each(|block| blocks.read(block, &mut triangles))?;
-        let mut order: Vec<(u64, u32)> = triangles.iter().map(T::key).zip(0..).collect();
-        order.sort_unstable();
-        Ok(Self { triangles, order })
-    }
-
-    /// The triangles of a brick, and how many they are.
-    fn brick(&self, brick: u32) -> (impl Iterator<Item = Triangle>, usize) {
-        let start = |brick: u64| self.order.partition_point(|(key, _)| *key < brick << 32);
-        let order = &self.order[start(u64::from(brick))..start(u64::from(brick) + 1)];
-        (order.iter().map(|&(_, place)| self.triangles[place as usize].triangle()), order.len())
-    }
+/// Objects and how many triangles of each were dropped.
+fn take_dropped(words: &[u64], objects: usize) -> Option<Vec<(usize, u64)>> {
+    let pairs = words.chunks_exact(2).map(|pair| (pair[0] as usize, pair[1]));
+    let all: Vec<(usize, u64)> = pairs.filter(|(object, _)| *object < objects).collect();
+    (all.len() * 2 == words.len()).then_some(all)
 }
 
-/// Appends what is pending to the files of its chunks.
-fn append<T: Stored>(pending: &mut [Vec<T>], chunks: &Chunks<T>) -> Result<(), BuildError> {
-    for (triangles, file) in pending.iter_mut().zip(&chunks.files) {
-        // The memory is given back too: the next triangles may be of other chunks.
-        file.append(&std::mem::take(triangles))?;
+/// Runs of bricks that follow each other, of about so many triangles.
+fn chunks(jobs: &[Job], most_triangles: u64) -> Vec<Range<usize>> {
+    let (mut chunks, mut start, mut triangles) = (Vec::new(), 0, 0);
+    for (index, job) in jobs.iter().enumerate() {
+        triangles += job.count as u64;
+        if triangles >= most_triangles || index + 1 == jobs.len() {
+            chunks.push(start..index + 1);
+            (start, triangles) = (index + 1, 0);
+        }
     }
-    Ok(())
+    chunks
+}
+
+fn runs<'a>(bounded: &Bounded<'a>) -> Vec<Run<'a>> {
+    let mut first = 0;
+    let objects = bounded.plan.objects.iter().enumerate();
+    let runs =
+        objects.flat_map(|(object, plan)| plan.runs(PART_TRIANGLES).into_iter().map(move |pieces| (object, pieces)));
+    runs.map(|(object, pieces)| {
+        let slots = pieces.iter().map(|piece| u64::from(piece.end - piece.first)).sum();
+        first += slots;
+        Run { object, pieces, first: first - slots, slots }
+    })
+    .collect()
+}
+
+/// Runs that follow each other, of at most so many slots unless one has more.
+fn windows(runs: &[Run], most_slots: u64) -> Vec<Range<usize>> {
+    let (mut windows, mut start) = (Vec::new(), 0);
+    while let Some(first) = runs.get(start) {
+        let fits = |run: &&Run| run.first + run.slots - first.first <= most_slots;
+        let count = runs[start..].iter().take_while(fits).count().max(1);
+        windows.push(start..start + count);
+        start += count;
+    }
+    windows
 }

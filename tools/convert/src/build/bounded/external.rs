@@ -1,7 +1,7 @@
 //! Splits items that do not fit in memory: the same cuts as `partition` makes, in passes over files.
 
 use crate::build::cut::partition::{Bins, Bounds, Item, least_side, longest_axis};
-use crate::build::disk::spill::{Blocks, Spill};
+use crate::build::disk::shard::{Blocks, ShardWriter};
 use crate::build::error::BuildError;
 use bytemuck::{Pod, Zeroable};
 use rayon::prelude::*;
@@ -31,12 +31,10 @@ impl From<&PackedItem> for Item {
 }
 
 /// Items on the disk that are to be cut.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Node {
-    /// Number of its file.
-    pub number: u64,
-    /// Bytes of its file.
-    pub length: u64,
+    /// Names of its shards.
+    pub shards: Vec<String>,
     /// Number of items.
     pub count: u64,
     /// Bounds of twice their centroids.
@@ -44,8 +42,8 @@ pub(super) struct Node {
 }
 
 /// Appends items.
-pub(super) fn append(items: &[Item], spill: &Spill<PackedItem>) -> Result<(), BuildError> {
-    spill.append_all(&items.iter().map(PackedItem::from).collect::<Vec<_>>())
+pub(super) fn append(items: &[Item], shard: &ShardWriter) -> Result<(), BuildError> {
+    shard.append_all(0, &items.iter().map(PackedItem::from).collect::<Vec<_>>())
 }
 
 fn read(blocks: &Blocks<PackedItem>, block: usize) -> Result<Vec<Item>, BuildError> {
@@ -55,8 +53,7 @@ fn read(blocks: &Blocks<PackedItem>, block: usize) -> Result<Vec<Item>, BuildErr
 }
 
 /// Reads all items.
-pub(super) fn load(spill: &Spill<PackedItem>) -> Result<Vec<Item>, BuildError> {
-    let blocks = spill.blocks()?;
+pub(super) fn load(blocks: &Blocks<PackedItem>) -> Result<Vec<Item>, BuildError> {
     let mut items = Vec::with_capacity(blocks.records() as usize);
     let mut packed = Vec::new();
     for block in 0..blocks.len() {
@@ -78,24 +75,23 @@ fn fold<A: Clone + Send + Sync>(
     (0..blocks.len()).into_par_iter().map(of_block).try_reduce(|| empty.clone(), |a, b| Ok(merge(a, b)))
 }
 
-/// Splits the items of `node`, which lie in `from`, as `partition` would.
+/// Splits the items of `node`, which lie in `blocks`, as `partition` would.
 pub(super) fn split(
     node: &Node,
-    from: &Spill<PackedItem>,
-    to: [&Spill<PackedItem>; 2],
+    blocks: &Blocks<PackedItem>,
+    to: [&ShardWriter; 2],
 ) -> Result<[(u64, Bounds); 2], BuildError> {
-    let blocks = from.blocks()?;
     if blocks.records() != node.count {
-        return Err(from.damaged());
+        return Err(blocks.damaged(0));
     }
-    let bins = fold(&blocks, Bins::new(&node.centroids), |bins, items| bins.count(items), Bins::merge)?;
+    let bins = fold(blocks, Bins::new(&node.centroids), |bins, items| bins.count(items), Bins::merge)?;
     let count = node.count as usize;
     match bins.cheapest(count, least_side(count)) {
-        Some(cut) => separate(&blocks, to, |item| cut.is_left(item)),
+        Some(cut) => separate(blocks, to, |item| cut.is_left(item)),
         None => {
             let axis = longest_axis(&node.centroids);
-            let middle = key_of_rank(&blocks, axis, node.count / 2)?;
-            separate(&blocks, to, |item| key(item, axis) < middle)
+            let middle = key_of_rank(blocks, axis, node.count / 2)?;
+            separate(blocks, to, |item| key(item, axis) < middle)
         }
     }
 }
@@ -104,7 +100,7 @@ pub(super) fn split(
 /// many there are and the bounds of twice their centroids.
 fn separate(
     blocks: &Blocks<PackedItem>,
-    to: [&Spill<PackedItem>; 2],
+    to: [&ShardWriter; 2],
     is_left: impl Fn(&Item) -> bool + Sync,
 ) -> Result<[(u64, Bounds); 2], BuildError> {
     let of_block = |block| {

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Start of a journal.
-const MAGIC: [u8; 16] = *b"brickwalk scrat\x01";
+const MAGIC: [u8; 16] = *b"brickwalk scrat\x02";
 
 /// A kind of step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +44,25 @@ pub(crate) enum Step {
     Levels,
 }
 
+impl Step {
+    /// Its name, as tasks of it are called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Begin => "begin",
+            Self::Textures => "textures",
+            Self::Objects => "objects",
+            Self::Gather => "gather",
+            Self::Split => "split",
+            Self::Cut => "cut",
+            Self::Repairs => "repairs",
+            Self::Distribute => "distribute",
+            Self::Encode => "encode",
+            Self::Opacity => "opacity",
+            Self::Levels => "levels",
+        }
+    }
+}
+
 /// A journal that grows by a record with each step.
 #[derive(Debug)]
 pub(crate) struct Journal {
@@ -51,7 +70,21 @@ pub(crate) struct Journal {
     file: File,
     /// Steps that were done before, still to be gone through.
     done: VecDeque<(u64, Vec<u64>)>,
+    /// Steps that were gone through.
+    position: u64,
     is_continued: bool,
+    access: Access,
+}
+
+/// Who reads a journal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Access {
+    /// Nobody else.
+    Own,
+    /// Other machines too, so that records lie on the disk before anything relies on them.
+    Shared,
+    /// A process that does not lead the conversion: it adds nothing.
+    Follow,
 }
 
 impl Journal {
@@ -68,11 +101,12 @@ impl Journal {
         read.is_ok() && start.len() < MAGIC.len() && MAGIC.starts_with(&start)
     }
 
-    /// Starts an empty journal.
-    pub fn create(path: PathBuf) -> Result<Self, BuildError> {
+    /// Starts an empty journal. If it is `is_shared`, other machines follow it.
+    pub fn create(path: PathBuf, is_shared: bool) -> Result<Self, BuildError> {
         let file = File::create_new(&path).and_then(|mut file| file.write_all(&MAGIC).map(|()| file));
         let file = file.map_err(|source| BuildError::Scratch { path: path.clone(), action: "create", source })?;
-        Ok(Self { path, file, done: VecDeque::new(), is_continued: false })
+        let access = if is_shared { Access::Shared } else { Access::Own };
+        Ok(Self { path, file, done: VecDeque::new(), position: 0, is_continued: false, access })
     }
 
     /// Opens a journal to continue it. The last record may be torn: it does not count.
@@ -81,13 +115,36 @@ impl Journal {
         let mut file = OpenOptions::new().read(true).write(true).open(&path).map_err(error)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).map_err(error)?;
-        let (mut done, mut end) = (VecDeque::new(), MAGIC.len());
-        while let Some((step, words, next)) = record_at(&bytes, end) {
-            done.push_back((step, words));
-            end = next;
-        }
+        let (done, end) = records(&bytes);
         file.set_len(end as u64).and_then(|()| file.seek(SeekFrom::End(0))).map_err(error)?;
-        Ok(Self { path, file, done, is_continued: true })
+        Ok(Self { path, file, done, position: 0, is_continued: true, access: Access::Own })
+    }
+
+    /// Opens the first `steps` steps of a journal that another process may be adding to.
+    ///
+    /// # Errors
+    /// It has not as many.
+    pub fn follow(path: PathBuf, steps: u64) -> Result<Self, BuildError> {
+        let error = |source| BuildError::Scratch { path: path.clone(), action: "read", source };
+        let mut file = File::open(&path).map_err(error)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(error)?;
+        let (mut done, _) = records(&bytes);
+        if !bytes.starts_with(&MAGIC) || (done.len() as u64) < steps {
+            return Err(BuildError::Behind { path });
+        }
+        done.truncate(steps as usize);
+        Ok(Self { path, file, done, position: 0, is_continued: true, access: Access::Follow })
+    }
+
+    /// Lets other machines follow it from now on.
+    pub fn share(&mut self) {
+        self.access = Access::Shared;
+    }
+
+    /// Number of steps that were gone through.
+    pub fn position(&self) -> u64 {
+        self.position
     }
 
     /// Whether some steps were done by an earlier run.
@@ -115,23 +172,43 @@ impl Journal {
     }
 
     /// The result of the next step: of an earlier run, or of `work`.
+    ///
+    /// # Errors
+    /// That of `work`; it cannot be recorded; another process leads the conversion and has not come to this step.
     pub fn step(
         &mut self,
         step: Step,
         work: impl FnOnce() -> Result<Vec<u64>, BuildError>,
     ) -> Result<Vec<u64>, BuildError> {
+        if self.done.is_empty() && self.access == Access::Follow {
+            return Err(BuildError::Behind { path: self.path.clone() });
+        }
+        self.shared_step(step, |_| work())
+    }
+
+    /// The same for a step whose tasks other processes may do, from its position: `work` then ends with an error.
+    pub fn shared_step(
+        &mut self,
+        step: Step,
+        work: impl FnOnce(u64) -> Result<Vec<u64>, BuildError>,
+    ) -> Result<Vec<u64>, BuildError> {
         match self.done.pop_front() {
-            Some((found, words)) if found == step as u64 => return Ok(words),
+            Some((found, words)) if found == step as u64 => {
+                self.position += 1;
+                return Ok(words);
+            }
             Some(_) => return Err(self.damaged()),
             None => {}
         }
-        let words = work()?;
+        let words = work(self.position)?;
         let mut record = vec![step as u64, words.len() as u64, 0];
         record.extend(&words);
         record[2] = checksum(&record);
         // In one write, so that a torn record is shorter and not another.
         let written = self.file.write_all(bytemuck::cast_slice(&record));
+        let written = written.and_then(|()| if self.access == Access::Shared { self.file.sync_data() } else { Ok(()) });
         written.map_err(|source| BuildError::Scratch { path: self.path.clone(), action: "write", source })?;
+        self.position += 1;
         Ok(words)
     }
 
@@ -144,6 +221,16 @@ impl Journal {
 /// Checksum of a record: of all its words but the third.
 fn checksum(record: &[u64]) -> u64 {
     xxh3_64(bytemuck::cast_slice(&record[..2])) ^ xxh3_64(bytemuck::cast_slice(&record[3..])).rotate_left(1)
+}
+
+/// The whole records of a journal, and where they end.
+fn records(bytes: &[u8]) -> (VecDeque<(u64, Vec<u64>)>, usize) {
+    let (mut records, mut end) = (VecDeque::new(), MAGIC.len());
+    while let Some((step, words, next)) = record_at(bytes, end) {
+        records.push_back((step, words));
+        end = next;
+    }
+    (records, end)
 }
 
 /// The record at `start` and where the next one starts.
@@ -255,7 +342,7 @@ mod tests {
     fn a_torn_record_does_not_count() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("journal");
-        let mut journal = Journal::create(path.clone()).unwrap();
+        let mut journal = Journal::create(path.clone(), false).unwrap();
         journal.step(Step::Begin, || Ok(vec![7])).unwrap();
         journal.step(Step::Gather, || Ok(vec![1, 2, 3])).unwrap();
         let whole = std::fs::read(&path).unwrap();
@@ -279,6 +366,31 @@ mod tests {
         }
         let mut journal = Journal::open(path).unwrap();
         assert!(journal.step(Step::Textures, || Ok(vec![])).is_err(), "another step than the recorded one");
+    }
+
+    #[test]
+    fn who_follows_adds_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("journal");
+        let mut journal = Journal::create(path.clone(), true).unwrap();
+        journal.step(Step::Begin, || Ok(vec![7])).unwrap();
+        journal.step(Step::Gather, || Ok(vec![1, 2, 3])).unwrap();
+        let whole = std::fs::read(&path).unwrap();
+        let mut torn = whole.clone();
+        torn.extend([1; 9]);
+        std::fs::write(&path, &torn).unwrap();
+        let mut follower = Journal::follow(path.clone(), 1).unwrap();
+        assert_eq!(follower.step(Step::Begin, || unreachable!()).unwrap(), [7]);
+        assert_eq!(follower.position(), 1);
+        assert!(matches!(follower.step(Step::Gather, || unreachable!()), Err(BuildError::Behind { .. })));
+        let done = follower.shared_step(Step::Gather, |position| {
+            assert_eq!(position, 1);
+            Err(BuildError::TaskDone)
+        });
+        assert!(matches!(done, Err(BuildError::TaskDone)));
+        assert!(Journal::follow(path.clone(), 2).is_ok());
+        assert!(matches!(Journal::follow(path.clone(), 3), Err(BuildError::Behind { .. })));
+        assert_eq!(std::fs::read(&path).unwrap(), torn);
     }
 
     #[test]

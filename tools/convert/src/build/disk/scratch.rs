@@ -1,7 +1,7 @@
 //! The scratch folder of a conversion that does not fit in memory.
 
 use super::journal::Journal;
-use super::spill::Spill;
+use super::shard::{self, Blocks, Shard, ShardWriter};
 use crate::build::error::BuildError;
 use crate::build::settings::BuildSettings;
 use bricks::ending::Temporary;
@@ -18,8 +18,12 @@ const JOURNAL: &str = "journal";
 #[derive(Debug)]
 pub(crate) struct Scratch {
     path: PathBuf,
+    /// Which conversion its shards are of.
+    conversion: u64,
+    /// Whether other machines read it.
+    is_shared: bool,
     is_kept: bool,
-    _noted: Temporary,
+    _noted: Option<Temporary>,
 }
 
 /// The scratch folder for `output`.
@@ -41,11 +45,11 @@ pub(crate) fn path_for(output: &Path, settings: &BuildSettings) -> PathBuf {
     }
 }
 
-/// Removes what an earlier conversion left in `path`, or with `resume` opens it.
+/// Removes what an earlier conversion left in `path`, or with `resume` opens its journal.
 ///
 /// # Errors
 /// What is there is not of an earlier conversion.
-pub(crate) fn earlier(path: &Path, resume: bool) -> Result<Option<(Scratch, Journal)>, BuildError> {
+pub(crate) fn earlier(path: &Path, resume: bool) -> Result<Option<Journal>, BuildError> {
     let error = |action, source| BuildError::Scratch { path: path.to_owned(), action, source };
     match fs::read_dir(path) {
         Err(failure) if failure.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -58,8 +62,7 @@ pub(crate) fn earlier(path: &Path, resume: bool) -> Result<Option<(Scratch, Jour
                 return Err(BuildError::NotScratch { path: path.to_owned() });
             }
             if resume && is_journal {
-                let scratch = Scratch { path: path.to_owned(), is_kept: true, _noted: Temporary::note(path) };
-                return Ok(Some((scratch, Journal::open(path.join(JOURNAL))?)));
+                return Ok(Some(Journal::open(path.join(JOURNAL))?));
             }
         }
     }
@@ -79,21 +82,68 @@ fn remove(path: &Path) -> io::Result<()> {
 }
 
 impl Scratch {
-    /// Makes the folder with an empty journal.
-    pub fn create(path: PathBuf) -> Result<(Self, Journal), BuildError> {
+    /// Makes the folder of a conversion with an empty journal. If it is `is_shared`, other machines read it.
+    pub fn create(path: PathBuf, conversion: u64, is_shared: bool) -> Result<(Self, Journal), BuildError> {
         fs::create_dir_all(&path).map_err(|source| BuildError::Scratch {
             path: path.clone(),
             action: "create",
             source,
         })?;
-        let scratch = Self { _noted: Temporary::note(&path), path, is_kept: false };
-        let journal = Journal::create(scratch.path.join(JOURNAL))?;
+        let scratch = Self::of(path, conversion, is_shared);
+        let journal = Journal::create(scratch.path.join(JOURNAL), is_shared)?;
         Ok((scratch, journal))
     }
 
-    /// A file of the folder of which the first `length` bytes count.
-    pub fn spill<T: bytemuck::Pod>(&self, name: &str, length: u64) -> Spill<T> {
-        Spill::at(self.path.join(name), length)
+    /// The folder of a conversion that is there.
+    pub fn of(path: PathBuf, conversion: u64, is_shared: bool) -> Self {
+        Self { _noted: Some(Temporary::note(&path)), path, conversion, is_shared, is_kept: false }
+    }
+
+    /// The folder of a conversion that another process leads, and the journal of its first `steps` steps. It is never
+    /// removed.
+    pub fn visit(path: PathBuf, steps: u64) -> Result<(Self, Journal), BuildError> {
+        let journal = Journal::follow(path.join(JOURNAL), steps)?;
+        Ok((Self { path, conversion: 0, is_shared: true, is_kept: true, _noted: None }, journal))
+    }
+
+    /// Says which conversion its shards are of.
+    pub fn name(&mut self, conversion: u64) {
+        self.conversion = conversion;
+    }
+
+    /// Which conversion its shards are of.
+    pub fn conversion(&self) -> u64 {
+        self.conversion
+    }
+
+    /// Starts a shard.
+    pub fn write(&self, name: &str) -> Result<ShardWriter, BuildError> {
+        ShardWriter::create(self.path.join(name), self.conversion)
+    }
+
+    /// Gives a shard its name, with what its task has to say.
+    pub fn finish(&self, shard: ShardWriter, facts: &[u64]) -> Result<(), BuildError> {
+        shard.finish(facts, self.is_shared)
+    }
+
+    /// Opens a shard.
+    pub fn shard(&self, name: &str) -> Result<Shard, BuildError> {
+        Shard::open(self.path.join(name), self.conversion)
+    }
+
+    /// The blocks of shards, one shard after the other.
+    pub fn blocks<T: bytemuck::Pod>(&self, names: &[String]) -> Result<Blocks<T>, BuildError> {
+        Ok(Blocks::of(names.iter().map(|name| self.shard(name)).collect::<Result<_, _>>()?))
+    }
+
+    /// Removes shards.
+    pub fn remove(&self, names: &[String]) {
+        names.iter().for_each(|name| shard::remove(&self.path.join(name)));
+    }
+
+    /// The error that a shard is not what it should be.
+    pub fn damaged(&self, name: &str) -> BuildError {
+        BuildError::ScratchDamaged { path: self.path.join(name) }
     }
 
     /// Whether the folder stays when this is dropped.

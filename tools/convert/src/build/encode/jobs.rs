@@ -1,6 +1,7 @@
 //! Encodes bricks in parallel and writes them in order.
 
 use super::brick::{BrickContext, EncodedBrick};
+use crate::build::disk::shard::{ShardReader, ShardWriter};
 use crate::build::error::BuildError;
 use crate::build::settings::BuildSettings;
 use crate::build::texture::opacity::MaterialOpacity;
@@ -23,11 +24,38 @@ pub(crate) struct Job {
     pub count: usize,
 }
 
+/// Where payloads go.
+pub(crate) trait Payloads: Send {
+    /// Writes a payload; where it lies there.
+    fn put(&mut self, payload: &[u8]) -> Result<Span, BuildError>;
+}
+
+impl Payloads for Writer {
+    fn put(&mut self, payload: &[u8]) -> Result<Span, BuildError> {
+        Ok(self.write(payload)?)
+    }
+}
+
+impl Payloads for ShardWriter {
+    fn put(&mut self, payload: &[u8]) -> Result<Span, BuildError> {
+        self.append(0, payload)
+    }
+}
+
+/// Copies a payload of a shard, if there is one, and says where it lies now.
+pub(crate) fn copy(shard: &ShardReader, span: &mut Span, writer: &mut Writer) -> Result<(), BuildError> {
+    if *span != Span::default() {
+        let mut payload = Vec::new();
+        shard.read::<u8>(*span, &mut payload)?;
+        *span = writer.write(&payload)?;
+    }
+    Ok(())
+}
+
 /// Bricks as they are written.
-#[derive(Debug)]
 pub(crate) struct BrickWriter<'a> {
-    /// The scene file.
-    pub writer: &'a mut Writer,
+    /// The scene file, or a shard.
+    writer: &'a mut dyn Payloads,
     /// Records of what is written.
     pub records: Vec<Brick>,
     /// Occupancy of what is written, if bricks have proxies.
@@ -39,10 +67,9 @@ pub(crate) struct BrickWriter<'a> {
 }
 
 impl<'a> BrickWriter<'a> {
-    /// Writes about `bricks` bricks of `objects` objects.
-    pub fn new(writer: &'a mut Writer, bricks: usize, objects: usize, batch_triangles: usize) -> Self {
-        let (records, occupancy) = (Vec::with_capacity(bricks), Vec::new());
-        Self { writer, records, occupancy, dropped: vec![0; objects], batch_triangles }
+    /// Writes bricks of `objects` objects.
+    pub fn new(writer: &'a mut dyn Payloads, objects: usize, batch_triangles: usize) -> Self {
+        Self { writer, records: Vec::new(), occupancy: Vec::new(), dropped: vec![0; objects], batch_triangles }
     }
 
     /// Encodes and writes bricks. `encode` makes one, or none if no triangle of it has an area; it also returns how
@@ -95,11 +122,11 @@ impl<'a> BrickWriter<'a> {
 
     fn write_batch(&mut self, bricks: Vec<EncodedBrick>) -> Result<(), BuildError> {
         for brick in bricks {
-            let geometry = self.writer.write(&brick.geometry)?;
-            let attributes = self.writer.write(&brick.attributes)?;
+            let geometry = self.writer.put(&brick.geometry)?;
+            let attributes = self.writer.put(&brick.attributes)?;
             let mut proxies = Span::default();
             if let Some((occupancy, payload)) = &brick.proxies {
-                proxies = self.writer.write(payload)?;
+                proxies = self.writer.put(payload)?;
                 self.occupancy.push(*occupancy);
             }
             self.records.push(Brick { geometry, attributes, proxies, ..brick.record });

@@ -80,6 +80,11 @@ impl<'a> Reader<'a> {
         self.source.origin(part.mesh as usize, part.part as usize, vertex)
     }
 
+    /// What was repaired in the parts that were read.
+    pub fn repairs(&self) -> Vec<String> {
+        self.source.repairs()
+    }
+
     /// Everything but the geometry.
     pub fn outline(&self) -> &'a Outline {
         self.source.outline()

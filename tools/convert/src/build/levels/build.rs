@@ -27,29 +27,19 @@ pub(crate) struct Levels {
 
 /// Writes levels.
 pub(crate) struct LevelWriter<'a> {
+    /// Makes them.
+    pub maker: Maker<'a>,
     /// The scene file.
     pub writer: &'a mut Writer,
-    /// The bricks, which are written.
-    pub bricks: &'a [Brick],
-    /// The instances, the world's first.
-    pub instances: &'a [Instance],
-    /// What bricks of each object have in common, with the materials of `flattened`.
-    pub contexts: &'a [BrickContext<'a>],
-    /// Materials of levels.
-    pub flattened: &'a Flattened<'a>,
-    /// Most triangles of a level.
-    pub brick_triangles: u32,
     /// Triangles a thread works on before what it made is written, which bounds the memory.
     pub batch_triangles: usize,
-    /// Who watches.
-    pub progress: &'a Progress,
 }
 
 impl LevelWriter<'_> {
     /// Makes and writes all levels, in steps of `journal` if there is one.
     pub fn write(&mut self, plan: &Plan, mut journal: Option<&mut Journal>) -> Result<Levels, BuildError> {
         let mut levels = Levels::default();
-        self.progress.phase("levels", plan.levels.len() as u64);
+        self.maker.progress.phase("levels", plan.levels.len() as u64);
         let Some(journal) = &mut journal else {
             self.write_some(&plan.levels, &mut levels)?;
             return Ok(levels);
@@ -69,15 +59,11 @@ impl LevelWriter<'_> {
         let first = levels.records.len();
         let words = journal.step(Step::Levels, || {
             self.write_some(some, levels)?;
-            let records = &levels.records[first..];
-            let spans = records.iter().flat_map(|level| [level.brick.geometry, level.brick.attributes]);
-            let mut words = Words::default();
-            words.put(self.writer.checkpoint()?).put_records(&spans.collect::<Vec<Span>>()).put_records(records);
-            Ok(words.0)
+            Ok(to_words(self.writer.checkpoint()?, &levels.records[first..]))
         })?;
         if levels.records.len() == first {
             levels.records.extend(take_written(&words).ok_or_else(|| journal.damaged())?);
-            self.progress.advance(some.len() as u64);
+            self.maker.progress.advance(some.len() as u64);
         }
         if levels.records.len() == first + some.len() { Ok(()) } else { Err(journal.damaged()) }
     }
@@ -85,15 +71,7 @@ impl LevelWriter<'_> {
     /// Makes and writes levels, the children of each written before it or among them.
     fn write_some(&mut self, planned: &[Planned], levels: &mut Levels) -> Result<(), BuildError> {
         let threads = rayon::current_num_threads();
-        let maker = Maker {
-            written: self.writer.written()?,
-            bricks: self.bricks,
-            instances: self.instances,
-            contexts: self.contexts,
-            flattened: self.flattened,
-            brick_triangles: self.brick_triangles,
-            progress: self.progress,
-        };
+        let work = Work { maker: &self.maker, written: self.writer.written()? };
         let line = Mutex::new(Line {
             planned,
             begun: VecDeque::new(),
@@ -104,7 +82,7 @@ impl LevelWriter<'_> {
             writer: Some(&mut *self.writer),
             error: None,
         });
-        rayon::scope(|scope| go_on(scope, &line, &maker));
+        rayon::scope(|scope| go_on(scope, &line, &work));
         let line = line.into_inner().unwrap_or_else(PoisonError::into_inner);
         // Children come before their parents in a plan, so that one can always be begun.
         assert!(line.error.is_some() || line.planned.is_empty() && line.begun.is_empty(), "all levels are written");
@@ -117,7 +95,7 @@ impl LevelWriter<'_> {
         let mut triangles = 0;
         let is_within = |planned: &&Planned| {
             let before = triangles;
-            triangles += triangles_of(&planned.children, self.bricks, levels);
+            triangles += triangles_of(&planned.children, self.maker.bricks, levels);
             before < budget
         };
         planned.iter().take_while(is_within).count()
@@ -202,16 +180,23 @@ fn locked<'s, 'a>(line: &'s Mutex<Line<'a>>) -> MutexGuard<'s, Line<'a>> {
     line.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// What levels are made with, and the payloads that they are made from.
+struct Work<'a> {
+    maker: &'a Maker<'a>,
+    written: Written,
+}
+
 /// Begins levels, as many as can be.
-fn go_on<'s, 'a>(scope: &Scope<'s>, line: &'s Mutex<Line<'a>>, maker: &'s Maker<'a>) {
+fn go_on<'s, 'a>(scope: &Scope<'s>, line: &'s Mutex<Line<'a>>, work: &'s Work<'a>) {
+    let maker = work.maker;
     let mut begin = locked(line);
     while let Some((index, planned, children)) = begin.begin(maker) {
         scope.spawn(move |scope| {
-            let made = maker.make(planned, &children);
+            let made = maker.make(&work.written, planned, &children);
             maker.progress.advance(1);
             locked(line).end(index, made);
             write_made(line, maker);
-            go_on(scope, line, maker);
+            go_on(scope, line, work);
         });
     }
 }
@@ -233,8 +218,16 @@ fn write_made(line: &Mutex<Line>, maker: &Maker) {
     }
 }
 
+/// For the journal: first how far the scene file is written and the payloads.
+pub(super) fn to_words(position: u64, records: &[Level]) -> Vec<u64> {
+    let spans = records.iter().flat_map(|level| [level.brick.geometry, level.brick.attributes]);
+    let mut words = Words::default();
+    words.put(position).put_records(&spans.collect::<Vec<Span>>()).put_records(records);
+    words.0
+}
+
 /// The levels of a step from the journal; see [`Journal::written`] for what comes before them.
-fn take_written(words: &[u64]) -> Option<Vec<Level>> {
+pub(super) fn take_written(words: &[u64]) -> Option<Vec<Level>> {
     let mut words = WordReader(words);
     words.take()?;
     words.take_records::<Span>()?;
@@ -242,14 +235,14 @@ fn take_written(words: &[u64]) -> Option<Vec<Level>> {
 }
 
 /// What is measured of a level, in steps.
-struct Lengths {
-    error: f64,
-    bound: f64,
-    color: f64,
+pub(super) struct Lengths {
+    pub error: f64,
+    pub bound: f64,
+    pub color: f64,
 }
 
 /// The record of a child.
-fn brick_of<'a>(child: &Leaf, bricks: &'a [Brick], levels: &'a [Level]) -> &'a Brick {
+pub(super) fn brick_of<'a>(child: &Leaf, bricks: &'a [Brick], levels: &'a [Level]) -> &'a Brick {
     level_of(child, bricks, levels).map_or_else(|| &bricks[child.brick as usize], |level| &level.brick)
 }
 
@@ -259,28 +252,38 @@ fn level_of<'a>(child: &Leaf, bricks: &[Brick], levels: &'a [Level]) -> Option<&
 }
 
 /// Triangles of children.
-fn triangles_of(children: &[Leaf], bricks: &[Brick], levels: &[Level]) -> usize {
+pub(super) fn triangles_of(children: &[Leaf], bricks: &[Brick], levels: &[Level]) -> usize {
     children.iter().map(|child| brick_of(child, bricks, levels).triangle_count as usize).sum()
 }
 
-/// What levels are made from.
-struct Maker<'a> {
-    written: Written,
-    bricks: &'a [Brick],
-    instances: &'a [Instance],
-    contexts: &'a [BrickContext<'a>],
-    flattened: &'a Flattened<'a>,
-    brick_triangles: u32,
-    progress: &'a Progress,
+/// What levels are made from, but for payloads.
+pub(crate) struct Maker<'a> {
+    /// The bricks, which are written.
+    pub bricks: &'a [Brick],
+    /// The instances, the world's first.
+    pub instances: &'a [Instance],
+    /// What bricks of each object have in common, with the materials of `flattened`.
+    pub contexts: &'a [BrickContext<'a>],
+    /// Materials of levels.
+    pub flattened: &'a Flattened<'a>,
+    /// Most triangles of a level.
+    pub brick_triangles: u32,
+    /// Who watches.
+    pub progress: &'a Progress,
 }
 
 impl Maker<'_> {
-    /// Makes a level of its children.
-    fn make(&self, planned: &Planned, children: &[Brick]) -> Result<Simplified, BuildError> {
+    /// Makes a level of its children, whose payloads are `written`.
+    pub(super) fn make(
+        &self,
+        written: &Written,
+        planned: &Planned,
+        children: &[Brick],
+    ) -> Result<Simplified, BuildError> {
         let children: Vec<Child> =
             planned.children.iter().zip(children).map(|(child, brick)| self.child(child, brick)).collect();
         let context = &self.contexts[planned.object as usize];
-        simplify(&self.written, &children, (context, self.flattened), self.brick_triangles)
+        simplify(written, &children, (context, self.flattened), self.brick_triangles)
     }
 
     fn child<'c>(&'c self, child: &Leaf, brick: &'c Brick) -> Child<'c> {
@@ -290,7 +293,7 @@ impl Maker<'_> {
     }
 
     /// The record of a level that is written.
-    fn record(&self, planned: &Planned, brick: Brick, made: Lengths, levels: &[Level]) -> Level {
+    pub(super) fn record(&self, planned: &Planned, brick: Brick, made: Lengths, levels: &[Level]) -> Level {
         let step = pow2(self.contexts[planned.object as usize].lattice.step_log2);
         let mut children = [Leaf { instance: NONE, brick: NONE }; bricks::LEVEL_CHILDREN];
         children[..planned.children.len()].copy_from_slice(&planned.children);

@@ -177,7 +177,7 @@ fn an_interrupted_conversion_is_continued() {
     };
     // In the collection, and in the distribution.
     interrupted(3, false);
-    interrupted(120, true);
+    interrupted(60, true);
     let other = BuildSettings { resume: true, brick_triangles: 501, ..settings.clone() };
     let result = build_source(&source, &other, &path, &Progress::hidden());
     assert!(matches!(result, Err(BuildError::OtherConversion { .. })), "{result:?}");

@@ -11,5 +11,6 @@ mod movable;
 mod placement;
 mod proxies;
 mod scenes;
+mod shared;
 mod sizes;
 mod structure;
