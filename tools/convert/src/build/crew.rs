@@ -136,6 +136,7 @@ impl Hands<'_> {
                 let verifies = |name: &String| scratch.shard(name).and_then(|shard| shard.verify()).is_ok();
                 if !(tasks.shards)(task as usize).iter().all(verifies) {
                     (tasks.work)(task as usize)?;
+                    scratch.settle()?;
                 }
                 Err(BuildError::TaskDone)
             }

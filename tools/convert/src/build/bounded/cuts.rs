@@ -305,6 +305,7 @@ impl Bounded<'_> {
             let to = [self.scratch.write(&names[0])?, self.scratch.write(&names[1])?];
             let sides = external::split(node, &self.scratch.blocks(&node.shards)?, [&to[0], &to[1]])?;
             to.into_iter().try_for_each(|shard| self.scratch.finish(shard, &[]))?;
+            self.scratch.settle()?;
             let mut words = Words::default();
             for (count, centroids) in sides {
                 words.put(count).put_point(centroids.min).put_point(centroids.max);

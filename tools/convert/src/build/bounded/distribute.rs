@@ -162,6 +162,7 @@ impl<'a> Distribution<'a> {
         let shard = scratch.write(&bricks_name(window))?;
         brick_of.chunks(SLOT_BLOCK).try_for_each(|slots| shard.append(0, slots).map(drop))?;
         scratch.finish(shard, &[])?;
+        scratch.settle()?;
         Ok(WindowBricks::Stored)
     }
 

@@ -126,6 +126,14 @@ impl Scratch {
         shard.finish(facts, self.is_shared)
     }
 
+    /// Waits until the names of shards are on the disk, if other machines read them.
+    pub fn settle(&self) -> Result<(), BuildError> {
+        // Elsewhere folders cannot be opened.
+        let is_due = self.is_shared && cfg!(unix);
+        let synced = if is_due { fs::File::open(&self.path).and_then(|folder| folder.sync_all()) } else { Ok(()) };
+        synced.map_err(|source| BuildError::Scratch { path: self.path.clone(), action: "sync", source })
+    }
+
     /// Opens a shard.
     pub fn shard(&self, name: &str) -> Result<Shard, BuildError> {
         Shard::open(self.path.join(name), self.conversion)

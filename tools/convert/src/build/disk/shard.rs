@@ -113,8 +113,7 @@ impl ShardWriter {
         let written = write_at(file, bytemuck::cast_slice(&words), *length)
             .and_then(|()| if shared { file.sync_all() } else { Ok(()) });
         written.map_err(|source| self.error(source))?;
-        let renamed = self.file.persist(&self.path).map_err(|failure| failure.error);
-        let named = renamed.and_then(|_| if shared { sync_folder(&self.path) } else { Ok(()) });
+        let named = self.file.persist(&self.path).map(drop).map_err(|failure| failure.error);
         named.map_err(|source| BuildError::Scratch { path: self.path.clone(), action: "name", source })
     }
 
@@ -280,12 +279,6 @@ impl<T: Pod> Blocks<T> {
 /// Whether an error says that bytes are missing, not that the system refuses them.
 fn is_damage(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::UnexpectedEof)
-}
-
-/// Waits until the name of a file is on the disk.
-fn sync_folder(path: &Path) -> io::Result<()> {
-    // Elsewhere folders cannot be opened.
-    if cfg!(unix) { File::open(path.parent().unwrap_or(Path::new(".")))?.sync_all() } else { Ok(()) }
 }
 
 /// Removes a shard; if that fails it goes with its folder.

@@ -133,14 +133,14 @@ fn textures_used_in_two_ways_are_stored_twice() {
 }
 
 /// [`Computed`], whose every other part has a normal texture and a second set of coordinates.
-struct Detailed {
+pub struct Detailed {
     plain: Computed,
     outline: Outline,
     turned: bool,
 }
 
 impl Detailed {
-    fn new(plain: Computed, turned: bool) -> Self {
+    pub fn new(plain: Computed, turned: bool) -> Self {
         let mut outline = plain.outline().clone();
         outline.textures = vec!["normals".to_owned()];
         outline.materials[1] = Material { normal_texture: 0, uv_sets: 1 << NORMAL, ..outline.materials[1] };
