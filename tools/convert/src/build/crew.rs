@@ -12,6 +12,9 @@ use super::error::BuildError;
 /// Tasks that the runs of triangles of a step make, where there are enough of them.
 const STEP_TASKS: usize = 32;
 
+/// Items of a task that goes through them, at least.
+const TASK_ITEMS: u64 = 1 << 19;
+
 /// Runs of triangles of a task at most.
 const MOST_RUNS: usize = 8;
 
@@ -100,6 +103,12 @@ impl Hands<'_> {
     /// How many of so many runs of triangles make up a task.
     pub fn runs_per_task(&self, runs: usize) -> usize {
         if self.are_many() { (runs / STEP_TASKS).clamp(1, MOST_RUNS) } else { runs.max(1) }
+    }
+
+    /// How many of the `parts` that so many items lie in make up a task.
+    pub fn parts_per_task(&self, items: u64, parts: usize) -> usize {
+        let tasks = if self.are_many() { (items / TASK_ITEMS).clamp(1, STEP_TASKS as u64) as usize } else { 1 };
+        parts.div_ceil(tasks).max(1)
     }
 
     /// Has all tasks of a step done, and hands each in order to `take`. What `take` finds damaged is made once more.

@@ -50,7 +50,7 @@ pub(crate) struct BoundedCuts {
 
 /// What was cut so far.
 #[derive(Default)]
-struct Found {
+pub(super) struct Found {
     /// By object.
     objects: BTreeMap<usize, ObjectCut>,
     /// Shards of orders, by the first object in them.
@@ -271,17 +271,23 @@ impl Bounded<'_> {
         pieces: &mut Pieces,
         journal: &mut Journal,
     ) -> Result<Node, BuildError> {
-        let (mut stack, mut leaves) = (vec![root], Vec::new());
-        while let Some(node) = stack.pop() {
-            self.progress.check()?;
-            if node.count > self.budget.items {
-                // The left side comes first.
-                let [left, right] = self.split(&node, found, journal)?;
-                stack.extend([right, left]);
-                self.discard(&node);
-            } else {
-                leaves.push(node);
+        let mut leaves = vec![root];
+        let is_large = |node: &&Node| node.count > self.budget.items;
+        while leaves.iter().any(|node| is_large(&node)) {
+            let nodes: Vec<&Node> = leaves.iter().filter(is_large).collect();
+            let mut sides = Vec::with_capacity(nodes.len());
+            for some in nodes.chunks(self.hands.at_once(nodes.len())) {
+                self.progress.check()?;
+                sides.extend(self.split(some, found, journal)?);
+                some.iter().for_each(|node| self.discard(node));
             }
+            let mut sides = sides.into_iter();
+            // Sides take the place of their node, the left one first.
+            let replace = |node: Node| match is_large(&&node) {
+                true => sides.next().map_or_else(Vec::new, |[left, right]| vec![left, right]),
+                false => vec![node],
+            };
+            leaves = leaves.into_iter().flat_map(replace).collect();
         }
         let mut large = Node { shards: Vec::new(), count: 0, centroids: Bounds::EMPTY };
         for some in leaves.chunks(self.hands.at_once(leaves.len())) {
@@ -297,30 +303,6 @@ impl Bounded<'_> {
         if !self.hands.is_task() {
             self.scratch.remove(&node.shards);
         }
-    }
-
-    fn split(&self, node: &Node, found: &mut Found, journal: &mut Journal) -> Result<[Node; 2], BuildError> {
-        let names = [found.next("items"), found.next("items")];
-        let words = journal.step(Step::Split, || {
-            let to = [self.scratch.write(&names[0])?, self.scratch.write(&names[1])?];
-            let sides = external::split(node, &self.scratch.blocks(&node.shards)?, [&to[0], &to[1]])?;
-            to.into_iter().try_for_each(|shard| self.scratch.finish(shard, &[]))?;
-            self.scratch.settle()?;
-            let mut words = Words::default();
-            for (count, centroids) in sides {
-                words.put(count).put_point(centroids.min).put_point(centroids.max);
-            }
-            Ok(words.0)
-        })?;
-        let mut words = WordReader(&words);
-        let mut side = |name| {
-            let count = words.take()?;
-            let centroids = Bounds { min: words.take_point()?, max: words.take_point()? };
-            Some(Node { shards: vec![name], count, centroids })
-        };
-        let [left, right] = names;
-        let sides = side(left).zip(side(right));
-        sides.map(|(left, right)| [left, right]).ok_or_else(|| journal.damaged())
     }
 
     /// Cuts nodes that fit in memory; adds to the large items.
@@ -402,7 +384,7 @@ impl Found {
     }
 
     /// A name for a shard of a kind.
-    fn next(&mut self, kind: &str) -> String {
+    pub fn next(&mut self, kind: &str) -> String {
         self.names += 1;
         format!("{kind}-{}", self.names)
     }

@@ -1,6 +1,7 @@
 //! Splits items that do not fit in memory: the same cuts as `partition` makes, in passes over files.
 
-use crate::build::cut::partition::{Bins, Bounds, Item, least_side, longest_axis};
+use crate::build::cut::partition::{Bins, Bounds, Cut, Item, least_side, longest_axis};
+use crate::build::disk::journal::{WordReader, Words};
 use crate::build::disk::shard::{Blocks, ShardWriter};
 use crate::build::error::BuildError;
 use bytemuck::{Pod, Zeroable};
@@ -75,37 +76,63 @@ fn fold<A: Clone + Send + Sync>(
     (0..blocks.len()).into_par_iter().map(of_block).try_reduce(|| empty.clone(), |a, b| Ok(merge(a, b)))
 }
 
-/// Splits the items of `node`, which lie in `blocks`, as `partition` would.
-pub(super) fn split(
-    node: &Node,
-    blocks: &Blocks<PackedItem>,
-    to: [&ShardWriter; 2],
-) -> Result<[(u64, Bounds); 2], BuildError> {
-    if blocks.records() != node.count {
-        return Err(blocks.damaged(0));
-    }
-    let bins = fold(blocks, Bins::new(&node.centroids), |bins, items| bins.count(items), Bins::merge)?;
-    let count = node.count as usize;
-    match bins.cheapest(count, least_side(count)) {
-        Some(cut) => separate(blocks, to, |item| cut.is_left(item)),
-        None => {
-            let axis = longest_axis(&node.centroids);
-            let middle = key_of_rank(blocks, axis, node.count / 2)?;
-            separate(blocks, to, |item| key(item, axis) < middle)
+/// Where items are split.
+pub(super) enum Place {
+    /// Between bins.
+    Bin(Cut),
+    /// Below this key along an axis.
+    Key(usize, u128),
+}
+
+impl Place {
+    fn is_left(&self, item: &Item) -> bool {
+        match self {
+            Self::Bin(cut) => cut.is_left(item),
+            Self::Key(axis, middle) => key(item, *axis) < *middle,
         }
     }
 }
 
-/// Appends the items for which `is_left` holds to the first file and the others to the second. Returns for both how
-/// many there are and the bounds of twice their centroids.
-fn separate(
+/// Counts items into the bins of a node.
+pub(super) fn count(node: &Node, blocks: &Blocks<PackedItem>) -> Result<Bins, BuildError> {
+    fold(blocks, Bins::new(&node.centroids), |bins, items| bins.count(items), Bins::merge)
+}
+
+/// Where `partition` would split the items of `node`: after its bins, if these have a cut, what of it is to be noted.
+/// `blocks` are all its items, which are read only if it has none.
+pub(super) fn place(
+    node: &Node,
+    bins: &Bins,
+    blocks: impl FnOnce() -> Result<Blocks<PackedItem>, BuildError>,
+    words: &mut Words,
+) -> Result<(), BuildError> {
+    bins.put(words);
+    let middle = match bins.cheapest(node.count as usize, least_side(node.count as usize)) {
+        Some(_) => 0,
+        None => key_of_rank(&blocks()?, longest_axis(&node.centroids), node.count / 2)?,
+    };
+    words.put(middle as u64).put((middle >> 64) as u64);
+    Ok(())
+}
+
+/// The place that was noted.
+pub(super) fn take_place(node: &Node, words: &mut WordReader) -> Option<Place> {
+    let bins = Bins::take(words, &node.centroids)?;
+    let middle = u128::from(words.take()?) | u128::from(words.take()?) << 64;
+    let cut = bins.cheapest(node.count as usize, least_side(node.count as usize));
+    Some(cut.map_or_else(|| Place::Key(longest_axis(&node.centroids), middle), Place::Bin))
+}
+
+/// Appends the items to the left of a place to the first shard and the others to the second. Returns for both how many
+/// there are and the bounds of twice their centroids.
+pub(super) fn separate(
     blocks: &Blocks<PackedItem>,
     to: [&ShardWriter; 2],
-    is_left: impl Fn(&Item) -> bool + Sync,
+    place: &Place,
 ) -> Result<[(u64, Bounds); 2], BuildError> {
     let of_block = |block| {
         let mut sides = [(0, Bounds::EMPTY); 2];
-        let (left, right): (Vec<Item>, Vec<Item>) = read(blocks, block)?.iter().partition(|item| is_left(item));
+        let (left, right): (Vec<Item>, Vec<Item>) = read(blocks, block)?.iter().partition(|item| place.is_left(item));
         for ((side, items), to) in sides.iter_mut().zip([left, right]).zip(to) {
             side.0 += items.len() as u64;
             items.iter().map(Item::centroids2).for_each(|centroid| side.1.extend(centroid, centroid));

@@ -7,6 +7,7 @@
 //! Where the cut goes depends on the triangles alone, not on how many a brick may hold, so parts for different limits
 //! are levels of one tree. That tree cut at [`CANONICAL_TRIANGLES`] gives the extents from which the lattice follows.
 
+use crate::build::disk::journal::{WordReader, Words};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -355,6 +356,23 @@ impl Bins {
             }
         }
         self
+    }
+
+    /// For the journal.
+    pub fn put(&self, words: &mut Words) {
+        for bin in self.bins.iter().flatten() {
+            words.put(bin.count as u64).put_point(bin.bounds.min).put_point(bin.bounds.max);
+        }
+    }
+
+    /// From the journal; `centroids` as in [`Self::new`].
+    pub fn take(words: &mut WordReader, centroids: &Bounds) -> Option<Self> {
+        let mut bins = Self::new(centroids);
+        for bin in bins.bins.iter_mut().flatten() {
+            bin.count = words.take()? as usize;
+            bin.bounds = Bounds { min: words.take_point()?, max: words.take_point()? };
+        }
+        Some(bins)
     }
 
     /// The items of both, counted in the same bins.

@@ -28,7 +28,7 @@ pub(crate) enum Step {
     Objects,
     /// The items of a large object are collected.
     Gather,
-    /// Items too many for the memory are split in two.
+    /// Items too many for the memory are split in two, where [`Step::Count`] says.
     Split,
     /// Items that fit are cut.
     Cut,
@@ -42,6 +42,8 @@ pub(crate) enum Step {
     Opacity,
     /// Some levels of detail are written.
     Levels,
+    /// Items too many for the memory are counted, to know where they are split.
+    Count,
 }
 
 impl Step {
@@ -59,6 +61,7 @@ impl Step {
             Self::Encode => "encode",
             Self::Opacity => "opacity",
             Self::Levels => "levels",
+            Self::Count => "count",
         }
     }
 }
