@@ -12,7 +12,7 @@ from typing import Any
 import brickwalk
 from brickwalk._brickwalk import ConversionWorker, convert_shared
 from brickwalk._convert import checked
-from distributed import Client, KilledWorker
+from distributed import Client, Future, KilledWorker, wait
 from distributed import TimeoutError as NotYet
 
 Path = str | os.PathLike[str]
@@ -81,9 +81,12 @@ def convert(
             for task in tasks
         ]
         try:
-            for future in futures:
-                while not _is_done(future):
+            futures.reverse()
+            while futures:
+                while not _is_done(futures[-1]):
                     yield None
+                # Not held any longer, or its worker's death would have it done again.
+                futures.pop().release()
                 yield True
         finally:
             client.cancel(futures)
@@ -91,9 +94,12 @@ def convert(
     return convert_shared(names, target, {**settings, "resume": resume}, perform, progress)
 
 
-def _is_done(future: Any) -> bool:
+def _is_done(future: Future) -> bool:
+    """Whether a task is done, after a while. Raises its error."""
     try:
-        future.result(timeout=TICK)
+        wait([future], timeout=TICK)
+        if future.status != "finished":
+            future.result()
     except NotYet:
         return False
     except KilledWorker as error:
