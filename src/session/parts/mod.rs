@@ -2,8 +2,7 @@
 //!
 //! A frame depends on those before it in two ways: denoising and anti-aliasing look at what they showed, and an
 //! automatic exposure adapts. Both come after all rays are traced. So a part is a frame before that, and what joins
-//! parts does the rest: the bytes are those of a walk that rendered all frames itself. Rendering takes most of the
-//! time, the rest little.
+//! parts does the rest: the bytes are those of a walk that rendered all frames itself.
 //!
 //! A part lies in a file of its own and says by a key what it is a part of: the same scene, settings and program.
 

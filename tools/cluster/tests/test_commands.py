@@ -61,6 +61,21 @@ def test_rows_of_other_devices_are_refused(tmp_path):
     assert merge(tmp_path / "out", [tmp_path / "0"]) == 1
 
 
+def test_a_conversion_has_the_bytes_of_one_machine(run, tmp_path, capfd):
+    model = tmp_path / "squares.obj"
+    rows = [f"v {x} {(x * y) % 7} {y}" for y in range(60) for x in range(60)]
+    corners = [(60 * y + x + 1, 60 * y + x + 2, 60 * y + x + 62) for y in range(59) for x in range(59)]
+    model.write_text("\n".join([*rows, *(f"f {a} {b} {c}" for a, b, c in corners)]) + "\n")
+    run("convert", model, "-o", tmp_path / "one.bricks", "--brick-triangles", "500", "--lod", "on")
+    line = ["convert", str(model), "-o", str(tmp_path / "many.bricks"), "--brick-triangles", "500", "--lod", "on"]
+    assert command([*line, "--workers", "2", "-q"]) == 0, capfd.readouterr().err
+    assert (tmp_path / "many.bricks").read_bytes() == (tmp_path / "one.bricks").read_bytes()
+    assert command(["convert", "none.obj", "-o", str(tmp_path / "a.bricks"), "--workers", "1"]) == 1
+    assert "none.obj" in capfd.readouterr().err
+    with pytest.raises(SystemExit):
+        command([*line, "--nonsense"])
+
+
 def test_what_a_part_says_is_passed_on(tmp_path, program, capfd):
     with Cluster(workers=1):
         pass
