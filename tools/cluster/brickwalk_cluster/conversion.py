@@ -40,9 +40,9 @@ def convert(
     """Converts models into one scene file, which appears whole or not at all, by tasks of ``client``'s cluster.
 
     Arguments are those of :func:`brickwalk.convert`. This process leads: it hands out tasks, puts what they make
-    together, and needs little memory. It and all workers must see the inputs, ``out``'s folder and ``scratch`` (default:
-    ``out``'s folder) under the same names. ``memory`` is that of one task, by default a quarter of this machine's, of
-    which large scenes take some 600 MB; ``threads`` are those of one task (1).
+    together, and needs little memory. It and all workers must see the inputs, ``out``'s folder and ``scratch`` (by
+    default ``out``'s folder) under the same names. ``memory`` is that of one task, by default a quarter of this
+    machine's; ``threads`` are those of one task (1).
 
     A worker that dies costs the tasks it had. Dask gives a task up whose workers died more often than its setting
     ``distributed.scheduler.allowed-failures`` says. Then, after Ctrl-C, or when this process dies, what is done stays,

@@ -1,9 +1,10 @@
 //! Who does the costly steps of a conversion: this process, or others that it leads.
 //!
-//! Such a step is divided into tasks. A task reads what earlier steps left in the scratch folder and writes shards there
-//! ([`super::disk::shard`]); these are all that is known of it. So it may be done by any process that sees the inputs
-//! and the folder, more than once, and by several at a time. A process that is asked for a task goes through the same
-//! steps as the one that leads ([`super::do_task`]): it takes their results from the journal, up to the step at hand.
+//! Such a step is divided into tasks. A task reads what earlier steps left in the scratch folder and writes shards
+//! there ([`super::disk::shard`]); these are all that is known of it. So it may be done by any process that sees the
+//! inputs and the folder, more than once, and by several at a time. A process that is asked for a task goes through the
+//! same steps as the one that leads ([`super::do_task`]): it takes their results from the journal, up to the step at
+//! hand.
 
 use super::disk::journal::Step;
 use super::disk::scratch::Scratch;

@@ -185,7 +185,7 @@ pub enum BuildError {
     },
     /// Another process leads the conversion, and its journal is not as far as it should be.
     #[error(
-        "{}: this journal does not have the steps before the task; let every worker see the folder of the scratch files",
+        "{}: this journal does not have the steps before the task; let every worker see the scratch folder",
         path.display()
     )]
     Behind {

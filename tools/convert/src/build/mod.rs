@@ -100,7 +100,9 @@ pub fn build_shared(
 ) -> Result<BuildSummary, BuildError> {
     run(source, settings, output, Hands::Crew(crew), progress, |conversion, threads, memory| {
         let budget = Budget::share(memory, threads, source, &conversion.plan, settings)?;
-        conversion::pool(budget.threads)?.install(|| conversion.bounded(budget))
+        // The process that leads has none of the tasks that the memory was divided for.
+        let threads = budget.threads.max(cores());
+        conversion::pool(threads)?.install(|| conversion.bounded(budget))
     })
 }
 
@@ -120,6 +122,10 @@ pub fn do_task(
     run(source, settings, output, Hands::Task(name, task), progress, |conversion, _, _| conversion.task(position))
 }
 
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
 fn run<T>(
     source: &dyn Source,
     settings: &BuildSettings,
@@ -132,7 +138,6 @@ fn run<T>(
     let outline = source.outline();
     objects::check(outline)?;
     let plan = objects::plan(outline, settings)?;
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = settings.threads.unwrap_or_else(cores);
     let memory = settings.memory_bytes.unwrap_or_else(budget::default_memory);
     let result = convert(Conversion { source, outline, plan, settings, output, hands, progress }, threads, memory);

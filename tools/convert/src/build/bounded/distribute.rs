@@ -1,8 +1,8 @@
 //! Brings the triangles of neighbouring bricks together on the scratch disk.
 //!
 //! Bricks are taken together in *chunks*, and chunks in *groups*. A task reads some runs of the source and writes a
-//! shard for each group, whose blocks are labelled with chunks. Whoever encodes a chunk reads its blocks from the shards
-//! of all tasks. A shard goes when the last chunk of its group is encoded.
+//! shard for each group, whose blocks are labelled with chunks. Whoever encodes a chunk reads its blocks from the
+//! shards of all tasks. A shard goes when the last chunk of its group is encoded.
 
 use super::budget;
 use super::cuts::{Bounded, BoundedCuts};

@@ -25,8 +25,10 @@ struct Threads<'a> {
     output: PathBuf,
     random: Mutex<Random>,
     /// Called before the results of a step are taken.
-    before: &'a (dyn Fn(&TaskStep, &[u64]) -> Result<(), CrewError> + Sync),
+    before: &'a Before,
 }
+
+type Before = dyn Fn(&TaskStep, &[u64]) -> Result<(), CrewError> + Sync;
 
 fn nothing(_: &TaskStep, _: &[u64]) -> Result<(), CrewError> {
     Ok(())
