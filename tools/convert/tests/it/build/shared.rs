@@ -25,10 +25,10 @@ struct Threads<'a> {
     output: PathBuf,
     random: Mutex<Random>,
     /// Called before the results of a step are taken.
-    before: &'a Before,
+    before: &'a Before<'a>,
 }
 
-type Before = dyn Fn(&TaskStep, &[u64]) -> Result<(), CrewError> + Sync;
+type Before<'a> = dyn Fn(&TaskStep, &[u64]) -> Result<(), CrewError> + Sync + 'a;
 
 fn nothing(_: &TaskStep, _: &[u64]) -> Result<(), CrewError> {
     Ok(())
