@@ -36,7 +36,7 @@ class Cluster:
     """Workers: those of the scheduler at ``address``, or ``workers`` processes on this machine.
 
     Processes of this machine share its cores, and the memory that is free; with ``shares_cores`` off, as for
-    measurements, each has all cores. Dask's own limit of memory is off, since brickwalk keeps to sizes that it is given.
+    measurements, each has all cores. Dask's own limit of memory is off: brickwalk keeps to sizes that it is given.
     """
 
     def __init__(self, address: str | None = None, workers: int | None = None, *, shares_cores: bool = True):

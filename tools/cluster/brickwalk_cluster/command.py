@@ -29,7 +29,10 @@ def parser() -> argparse.ArgumentParser:
     where = own.add_mutually_exclusive_group()
     where.add_argument("--scheduler", metavar="ADDRESS", help="a scheduler of Dask that runs, as tcp://host:8786")
     where.add_argument(
-        "--workers", type=_count, metavar="N", help="processes on this machine [default: one for four cores; one to measure]"
+        "--workers",
+        type=_count,
+        metavar="N",
+        help="processes on this machine [default: one for four cores; one to measure]",
     )
     own.add_argument("-q", "--quiet", action="store_true", help="say errors only")
 
@@ -47,7 +50,9 @@ def parser() -> argparse.ArgumentParser:
         )
 
     one = add("walk", "render frames along a camera path", "S.bricks -o DIR")
-    one.add_argument("--chunk", type=_count, metavar="N", help="frames that a task renders [default: eight tasks a worker]")
+    one.add_argument(
+        "--chunk", type=_count, metavar="N", help="frames that a task renders [default: eight tasks a worker]"
+    )
     one.add_argument("--disk-cache", metavar="DIR,SIZE", help="keep parts of scenes from URLs in a folder")
     add("study", "measure error against run time, an effect a task", "S.bricks -o DIR")
     one = add("bench", "run benchmarks, a stage a task", "{" + ",".join(BENCHES) + "} -o DIR")
@@ -64,17 +69,25 @@ def _add_convert(one: argparse.ArgumentParser) -> None:
     one.add_argument("-o", "--output", required=True, metavar="S.bricks", help="the scene file")
     one.add_argument("--memory", metavar="SIZE", default=nothing, help="of a task, as 1G [default: a quarter of all]")
     one.add_argument("--threads", type=_count, metavar="N", default=nothing, help="of a task [default: 1]")
-    one.add_argument("--scratch", metavar="DIR", default=nothing, help="folder that all workers see [default: S.bricks's]")
+    one.add_argument(
+        "--scratch", metavar="DIR", default=nothing, help="folder that all workers see [default: S.bricks's]"
+    )
     one.add_argument("--brick-triangles", type=_count, metavar="N", default=nothing, help="of a brick, at most")
     one.add_argument("--lod", type=_switch, metavar="on|off", default=nothing, help="levels of detail")
     one.add_argument("--textures", choices=["bc7", "raw"], default=nothing, help="how textures are stored")
-    one.add_argument("--movable", type=_names, metavar="NODES", default=nothing, help="nodes that may move, with commas")
+    one.add_argument(
+        "--movable", type=_names, metavar="NODES", default=nothing, help="nodes that may move, with commas"
+    )
     one.add_argument("--up", choices=["y", "z"], default=nothing, help="the axis that points up")
     one.add_argument("--metres", type=float, metavar="X", default=nothing, help="metres of a unit of the models")
     one.add_argument("--fast", action="store_true", default=nothing, help="build trees sooner; tracing takes longer")
-    one.add_argument("--no-proxies", dest="proxies", action="store_false", default=nothing, help="no occupancy of bricks")
+    one.add_argument(
+        "--no-proxies", dest="proxies", action="store_false", default=nothing, help="no occupancy of bricks"
+    )
     one.add_argument("--drop-non-finite", action="store_true", default=nothing, help="leave bad triangles out")
-    one.add_argument("--anew", dest="resume", action="store_false", default=nothing, help="forget an earlier, broken run")
+    one.add_argument(
+        "--anew", dest="resume", action="store_false", default=nothing, help="forget an earlier, broken run"
+    )
 
 
 def _switch(text: str) -> bool:

@@ -9,11 +9,12 @@ import uuid
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+from distributed import Client, Future, KilledWorker, wait
+from distributed import TimeoutError as NotYet
+
 import brickwalk
 from brickwalk._brickwalk import ConversionWorker, convert_shared
 from brickwalk._convert import checked
-from distributed import Client, Future, KilledWorker, wait
-from distributed import TimeoutError as NotYet
 
 Path = str | os.PathLike[str]
 

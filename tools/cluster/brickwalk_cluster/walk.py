@@ -44,9 +44,7 @@ def job(words: Sequence[str], disk_cache: str | None = None) -> Job:
 
     Raises :class:`Failed` with what the program ``brickwalk`` says of them.
     """
-    done = subprocess.run(
-        [program(), "-q", "jobs", "--format", "json", "--", "walk", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+    done = subprocess.run([program(), "-q", "jobs", "--format", "json", "--", "walk", *words], capture_output=True)
     if done.returncode:
         text = done.stderr.decode(errors="replace").strip().splitlines()
         raise Failed(text[-1].removeprefix("brickwalk: ") if text else "the program brickwalk failed")
@@ -115,7 +113,7 @@ def _hash(path: Path) -> str:
 
 
 def _with_cache(settings: str, size: int) -> str:
-    """The settings with a cache of ``size`` bytes where they leave it to the machine, which here has several workers."""
+    """The settings with a cache of ``size`` bytes where they leave it to the machine, which has several workers."""
     return settings if re.search(r"^cache = ", settings, re.MULTILINE) else f'cache = "{size}"\n{settings}'
 
 

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from brickwalk_cluster import Cluster, Failed
-from brickwalk_cluster.commands import merge, split
 from brickwalk_cluster.command import run as command
+from brickwalk_cluster.commands import merge, split
 
 
 def rows(folder):

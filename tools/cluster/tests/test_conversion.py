@@ -12,8 +12,9 @@ import threading
 import time
 from pathlib import Path
 
-import brickwalk
 import pytest
+
+import brickwalk
 
 ROOT = Path(__file__).resolve().parents[1]
 # Workers and other processes import the package from here, whether it is installed or not.
@@ -21,9 +22,10 @@ sys.path.insert(0, str(ROOT))
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), *os.environ.get("PYTHONPATH", "").split(os.pathsep)]).rstrip(":")
 
 import dask  # noqa: E402
-from brickwalk_cluster import conversion  # noqa: E402
 from distributed import Client, LocalCluster  # noqa: E402
 from distributed.core import Status  # noqa: E402
+
+from brickwalk_cluster import conversion  # noqa: E402
 
 WORKERS = 4
 

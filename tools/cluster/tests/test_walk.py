@@ -110,7 +110,7 @@ def test_a_scheduler_that_is_killed_loses_nothing(city, whole, tmp_path, program
     process.wait()
     before = {path.name: path.stat().st_mtime_ns for path in parts.glob("*.part")}
     assert before and not (tmp_path / DONE).exists()
-    again = subprocess.run(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    again = subprocess.run(line, capture_output=True, text=True)
     assert again.returncode == 0, again.stderr
     rendered = int(again.stdout.split(" rendered")[0].split()[-1])
     assert rendered <= 60 - len(before) + 2
@@ -122,7 +122,15 @@ def test_a_scheduler_elsewhere_that_goes_away_and_comes_back(city, whole, tmp_pa
         words = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
         file = tmp_path / f"scheduler-{time.monotonic_ns()}.json"
         scheduler = subprocess.Popen([*words, "--scheduler-file", str(file)], stderr=subprocess.DEVNULL)
-        workers = [sys.executable, "-m", "distributed.cli.dask_worker", "--scheduler-file", str(file), "--nthreads", "1"]
+        workers = [
+            sys.executable,
+            "-m",
+            "distributed.cli.dask_worker",
+            "--scheduler-file",
+            str(file),
+            "--nthreads",
+            "1",
+        ]
         workers += ["--nworkers", "2", "--memory-limit", "0", "--no-dashboard", "--death-timeout", "20"]
         worker = subprocess.Popen(workers, stderr=subprocess.DEVNULL, start_new_session=True)
         deadline = time.monotonic() + 60
