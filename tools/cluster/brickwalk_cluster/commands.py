@@ -112,8 +112,8 @@ def _merge_lines(output: Path, files: Sequence[Path]) -> int:
         if header is not None and own != header:
             different = ", ".join(name for name in own if own[name] != header.get(name))
             raise Failed(
-                f"{file}: measured with another {different} than the parts before it: times of different devices do not go "
-                "into one table; give workers of one kind"
+                f"{file}: measured with another {different} than the parts before it: times of other devices do not "
+                "go into one table; give workers of one kind"
             )
         header = own
         lines.update(dict.fromkeys(rest))

@@ -8,7 +8,7 @@ import pytest
 import brickwalk
 
 # A call that never returns is told with its stacks.
-faulthandler.dump_traceback_later(900, exit=True)
+faulthandler.dump_traceback_later(1500, exit=True)
 
 
 @pytest.fixture(scope="session")
