@@ -473,7 +473,7 @@ pub struct WalkArgs {
     /// Print records on standard output, too, one JSON object per line
     #[arg(long, hide_short_help = true)]
     pub json: bool,
-    /// Render frame N, or the frames FIRST to LAST, apart from the others, into DIR/parts, for --join
+    /// Render frame N, or FIRST to LAST, apart from the others, into DIR/parts, for --join [default: none]
     ///
     /// Any machine may render any part, in any order; the commands differ in this option alone. What is there and whole
     /// is not rendered again.

@@ -238,7 +238,7 @@ fn videos_are_named_as_what_they_are() {
 
 #[test]
 fn what_is_given_comes_back() {
-    for options in ["", "--quality high --spp 4", "--denoise --cache 64M --sun 1,2,3 --dvf-points 12 --hide a,b"] {
+    for options in ["", "--quality high --spp 4", "--denoise --cache 64M --sun 1,2,3 --dvf-points 1200 --hide a,b"] {
         let settings = Settings::from_options(options).unwrap();
         let text = settings.to_given_toml();
         assert_eq!(Settings::from_toml(&text), Ok(settings), "{text}");
