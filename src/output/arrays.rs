@@ -2,7 +2,7 @@
 //!
 //! | bytes | what |
 //! | --- | --- |
-//! | 8 | [`MAGIC`] |
+//! | 8 | `BWARRAY1` |
 //! | 8 | u64, length of the head |
 //! | | the head: an object, in which `arrays` says of each its name, its bytes, and those of its packed blocks |
 //! | | the blocks: of every four bytes first all the first ones, then all the second, and so on, packed ([`pack`]) |
