@@ -28,10 +28,12 @@ pub fn run(args: &JobsArgs) -> Result<()> {
     match args.format {
         JobFormat::Json => {
             let (scene, output) = walk.files()?;
+            let scene = cached::scene(scene)?;
             let job = json!({
-                "scene": cached::scene(scene)?.to_string_lossy(),
+                "scene": scene.to_string_lossy(),
                 "output": output.to_string_lossy(),
                 "frames": settings.frames,
+                "key": parts::key_of(&scene, &settings)?,
                 "settings": settings.to_given_toml(),
             });
             print(&(serde_json::to_string_pretty(&job)? + "\n"))

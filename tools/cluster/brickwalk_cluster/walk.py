@@ -23,6 +23,8 @@ from .cluster import Cluster, Failed, Progress, program, results
 
 #: What says that a walk is finished, and what its frames are.
 DONE = "cluster.json"
+#: Settings that no picture depends on.
+WITHOUT_EFFECT = ("adapter =", "cache =", "evict =", "host_cache =", "workers =")
 #: What parts took, in sum.
 SUMS = ("seconds", "bytes_loaded", "requests", "bytes_fetched", "seconds_waiting")
 
@@ -36,6 +38,7 @@ class Job:
     output: str
     settings: str
     frames: int
+    key: str
     disk_cache: str | None = None
 
 
@@ -49,7 +52,7 @@ def job(words: Sequence[str], disk_cache: str | None = None) -> Job:
         text = done.stderr.decode(errors="replace").strip().splitlines()
         raise Failed(text[-1].removeprefix("brickwalk: ") if text else "the program brickwalk failed")
     found = json.loads(done.stdout)
-    return Job(os.getcwd(), found["scene"], found["output"], found["settings"], found["frames"], disk_cache)
+    return Job(os.getcwd(), found["scene"], found["output"], found["settings"], found["frames"], found["key"], disk_cache)
 
 
 #: The walk that this worker has open, with its session and cache.
@@ -108,6 +111,12 @@ def is_done(output: str | os.PathLike[str], key: str) -> bool:
         return False
 
 
+def identity(key: str, settings: str) -> str:
+    """What the pictures of a walk are known by: the ``key`` of its parts, and settings that count after these."""
+    lines = [line for line in settings.splitlines() if not line.startswith(WITHOUT_EFFECT)]
+    return f"{key}-{hashlib.sha256(chr(10).join(lines).encode()).hexdigest()[:16]}"
+
+
 def _hash(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
@@ -139,8 +148,10 @@ def walk(
         parts = WalkParts(own.scene, own.settings, disk_cache)
     except (BrickwalkError, OSError, ValueError) as error:
         raise Failed(" ".join(str(error).split())) from error
-    key = parts.key
     parts.close()
+    if parts.key != own.key:
+        raise Failed(f"{program()} and the package brickwalk are of different commits; install both from one")
+    key = identity(parts.key, own.settings)
     if is_done(own.output, key):
         return {"key": key, "frames": own.frames, "rendered": 0, **dict.fromkeys(SUMS, 0), "warnings": []}
     share = cluster.share_of_memory()

@@ -16,7 +16,7 @@ from conftest import frames
 
 from brickwalk_cluster import Cluster, Failed, walk
 from brickwalk_cluster.command import run as command
-from brickwalk_cluster.walk import DONE, is_done, ranges
+from brickwalk_cluster.walk import DONE, identity, is_done, ranges
 
 #: Denoised frames with an automatic exposure: each depends on those before it.
 VIEW = ["--frames", "60", "--size", "64x36", "--adapter", "cpu"]
@@ -184,6 +184,21 @@ def test_what_is_wrong_is_said_in_a_line(city, tmp_path, program, capfd, monkeyp
     monkeypatch.setenv("BRICKWALK", "no-such-program")
     with Cluster(workers=1) as cluster, pytest.raises(Failed, match="BRICKWALK names no program"):
         walk(cluster, words(city, tmp_path))
+
+
+def test_another_exposure_is_another_walk(city, whole, tmp_path, program):
+    """Parts do not depend on it, pictures do."""
+    one = identity("k", 'spp = 4\nexposure = "1.0"\ncache = "64M"\n')
+    assert one == identity("k", 'spp = 4\nexposure = "1.0"\n') != identity("k", 'spp = 4\nexposure = "2.0"\n')
+    with Cluster(workers=1) as cluster:
+        short = [*words(city, tmp_path), "--exposure", "1"]
+        short[short.index("60")] = "3"
+        assert walk(cluster, short, is_quiet=True)["rendered"] == 3
+        bright = frames(tmp_path)
+        assert walk(cluster, short, is_quiet=True)["rendered"] == 0
+        short[-1] = "-1"
+        assert walk(cluster, short, is_quiet=True)["rendered"] == 3
+        assert frames(tmp_path).keys() == bright.keys() and frames(tmp_path) != bright
 
 
 def test_a_changed_part_is_noticed(city, whole, tmp_path, program):
