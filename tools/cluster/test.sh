@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the package beside the wheel that tools/python/test.sh has built, and runs its tests. Options go to pytest.
-# BRICKWALK names the program; else the one of this checkout is taken, built if need be.
+# BRICKWALK names the program; else the one that this checkout has built last is taken, or built. It must be of the
+# wheel's commit, which is seen to before anything is rendered.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.." && pwd)
@@ -11,8 +12,9 @@ environment=$target/python/venv
 [ -x "$environment/bin/python" ] || fail "$environment is missing; run tools/python/test.sh first"
 if [ -z "${BRICKWALK:-}" ]; then
     prepare
-    # With --workspace as all else is built, so that nothing is compiled again.
-    cargo build --quiet --release --workspace --manifest-path "$root/Cargo.toml" --bin brickwalk
+    # The tests of the workspace have built it.
+    [ -x "$target/release/brickwalk" ] ||
+        cargo build --quiet --release --workspace --manifest-path "$root/Cargo.toml" --bin brickwalk
     BRICKWALK=$target/release/brickwalk
 fi
 export BRICKWALK PYTHONDONTWRITEBYTECODE=1
