@@ -52,7 +52,15 @@ def job(words: Sequence[str], disk_cache: str | None = None) -> Job:
         text = done.stderr.decode(errors="replace").strip().splitlines()
         raise Failed(text[-1].removeprefix("brickwalk: ") if text else "the program brickwalk failed")
     found = json.loads(done.stdout)
-    return Job(os.getcwd(), found["scene"], found["output"], found["settings"], found["frames"], found["key"], disk_cache)
+    return Job(
+        os.getcwd(),
+        found["scene"],
+        found["output"],
+        found["settings"],
+        found["frames"],
+        found.get("key", ""),
+        disk_cache,
+    )
 
 
 #: The walk that this worker has open, with its session and cache.
