@@ -4,7 +4,8 @@
 //! one that joins renders what is missing.
 
 use super::cached;
-use super::options::args::{Cli, Command, FrameRange, JobFormat, JobsArgs, WalkArgs};
+use super::options::args::{Cli, Command, WalkArgs};
+use super::options::job_args::{FrameRange, JobFormat, JobsArgs};
 use crate::cli::output::{Usage, print};
 use crate::session::parts;
 use anyhow::Result;

@@ -1,6 +1,6 @@
 //! `walk --part` and `walk --join`: frames that are rendered apart, and what makes a walk of them.
 
-use super::options::args::FrameRange;
+use super::options::job_args::FrameRange;
 use super::watcher::Watcher;
 use crate::cli::output::{Usage, note, warn};
 use crate::output::atomic;

@@ -5,6 +5,7 @@
 use super::group_args::OfView;
 use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
+use super::job_args::{FrameRange, JobsArgs};
 use super::query_args::QueryArgs;
 use super::scene_kind::{SceneKind, scene_help};
 use super::scene_name::scene_name;
@@ -23,9 +24,7 @@ use brickwalk_convert::build::{LatticeStep, TextureEncoding};
 use brickwalk_scenes::Stiff;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand};
-use std::fmt;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 /// Ray traces scenes that do not fit in GPU memory, and walks a camera through them.
 ///
@@ -494,35 +493,6 @@ pub struct WalkArgs {
     given: GroupArgs<OfWalk>,
 }
 
-/// Frames of a walk, from 0, both ends among them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FrameRange {
-    /// The first.
-    pub first: u32,
-    /// The last.
-    pub last: u32,
-}
-
-impl FromStr for FrameRange {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("{text:?} is no number of a frame"));
-        let (first, last) = text.split_once('-').unwrap_or((text, text));
-        let range = Self { first: number(first)?, last: number(last)? };
-        if range.first <= range.last { Ok(range) } else { Err("the first frame comes after the last one".into()) }
-    }
-}
-
-impl fmt::Display for FrameRange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.first == self.last {
-            true => write!(f, "{}", self.first),
-            false => write!(f, "{}-{}", self.first, self.last),
-        }
-    }
-}
-
 impl WalkArgs {
     /// The settings: what was given, else what the file says, else the defaults.
     ///
@@ -542,38 +512,6 @@ impl WalkArgs {
         let missing = || Usage("walk needs a scene and --output".into());
         self.scene.as_deref().zip(self.output.as_deref()).ok_or_else(missing)
     }
-}
-
-/// Options of `jobs`.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = UNITS)]
-pub struct JobsArgs {
-    /// What is printed: lines, a command each; openjd, a job template; json, what a program needs that splits the walk
-    ///
-    /// `lines`: the last one joins what the others render. Slurm arrays, GNU parallel, HyperQueue and OpenCue take such
-    /// lines. `openjd`: JSON of the Open Job Description specification, 2023-09. `json`: the scene, which is converted
-    /// if it is a model, the folder, the number of frames, and the settings as a TOML file.
-    #[arg(long, value_enum)]
-    pub format: JobFormat,
-    /// Frames that a task renders [1 to 1000000]
-    ///
-    /// The scene is opened anew for each. More of them open it less often; fewer lose less when a machine fails.
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub chunk: u32,
-    /// The command: walk with its scene, folder and options, as -- walk city.bricks -o out --frames 600
-    #[arg(last = true, required = true, value_name = "walk ...", allow_hyphen_values = true)]
-    pub command: Vec<String>,
-}
-
-/// What `jobs` prints.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum JobFormat {
-    /// A command a line.
-    Lines,
-    /// An Open Job Description template.
-    Openjd,
-    /// What a program needs that splits the walk.
-    Json,
 }
 
 /// Which settings `view` and `serve` begin with.

@@ -3,6 +3,7 @@
 pub mod args;
 pub mod group_args;
 pub mod inputs;
+pub mod job_args;
 pub mod query_args;
 pub mod removed;
 pub mod scene_kind;
