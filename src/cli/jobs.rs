@@ -5,7 +5,7 @@
 
 use super::cached;
 use super::options::args::{Cli, Command, WalkArgs};
-use super::options::job_args::{FrameRange, JobFormat, JobsArgs};
+use super::options::job_args::{JobFormat, JobsArgs, PartRange};
 use crate::cli::output::{Usage, print};
 use crate::session::parts;
 use anyhow::Result;
@@ -25,7 +25,7 @@ pub fn run(args: &JobsArgs) -> Result<()> {
     let walk = walk(&args.command)?;
     let settings = walk.settings()?;
     parts::check(&settings).map_err(|error| Usage(error.to_string()))?;
-    let chunks = chunks(settings.frames, args.chunk);
+    let chunks = chunks(parts::count(&settings), args.chunk);
     match args.format {
         JobFormat::Json => {
             let (scene, output) = walk.files()?;
@@ -34,6 +34,7 @@ pub fn run(args: &JobsArgs) -> Result<()> {
                 "scene": scene.to_string_lossy(),
                 "output": output.to_string_lossy(),
                 "frames": settings.frames,
+                "parts": parts::count(&settings),
                 "key": parts::key_of(&scene, &settings)?,
                 "settings": settings.to_given_toml(),
             });
@@ -68,19 +69,19 @@ fn walk(words: &[String]) -> Result<Box<WalkArgs>> {
     Ok(walk)
 }
 
-/// The frames, so many at a time.
-fn chunks(frames: u32, most: u32) -> Vec<FrameRange> {
-    let starts = (0..frames).step_by(most as usize);
-    starts.map(|first| FrameRange { first, last: (first.saturating_add(most) - 1).min(frames - 1) }).collect()
+/// The parts, so many at a time.
+fn chunks(parts: u32, most: u32) -> Vec<PartRange> {
+    let starts = (0..parts).step_by(most as usize);
+    starts.map(|first| PartRange { first, last: (first.saturating_add(most) - 1).min(parts - 1) }).collect()
 }
 
 /// A command a line: those that render, then the one that joins.
-fn lines(words: &[String], chunks: &[FrameRange]) -> String {
+fn lines(words: &[String], chunks: &[PartRange]) -> String {
     let line = |more: &str| {
         let words = ["brickwalk"].into_iter().chain(words.iter().map(String::as_str));
         words.map(quoted).collect::<Vec<_>>().join(" ") + " " + more + "\n"
     };
-    chunks.iter().map(|frames| line(&format!("--part {frames}"))).chain(once(line("--join"))).collect()
+    chunks.iter().map(|parts| line(&format!("--part {parts}"))).chain(once(line("--join"))).collect()
 }
 
 /// A word as shells of POSIX read it.
@@ -93,7 +94,7 @@ fn quoted(word: &str) -> Cow<'_, str> {
 }
 
 /// A job template: a step whose tasks render, and one that joins. Names of files count from the template's folder.
-fn template(words: &[String], chunks: &[FrameRange]) -> Result<Value> {
+fn template(words: &[String], chunks: &[PartRange]) -> Result<Value> {
     let usage = |text: String| anyhow::Error::from(Usage(text));
     if chunks.len() > MOST_TASKS {
         let text = format!("jobs: Open Job Description allows {MOST_TASKS} tasks, not {}; raise --chunk", chunks.len());
@@ -127,12 +128,12 @@ fn template(words: &[String], chunks: &[FrameRange]) -> Result<Value> {
                 "name": "Render",
                 "parameterSpace": {
                     "taskParameterDefinitions": [{
-                        "name": "Frames",
+                        "name": "Parts",
                         "type": "STRING",
                         "range": chunks.iter().map(ToString::to_string).collect::<Vec<_>>(),
                     }],
                 },
-                "script": script(["--part", "{{Task.Param.Frames}}"]),
+                "script": script(["--part", "{{Task.Param.Parts}}"]),
             },
             { "name": "Join", "dependencies": [{ "dependsOn": "Render" }], "script": script(["--join", ""]) },
         ],
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn every_frame_is_in_one_chunk() {
+    fn every_part_is_in_one_chunk() {
         for (frames, most) in [(1, 10), (10, 10), (25, 10), (7, 1), (5, 1_000_000)] {
             let all: Vec<u32> = chunks(frames, most).iter().flat_map(|range| range.first..=range.last).collect();
             assert_eq!(all, (0..frames).collect::<Vec<_>>());
@@ -198,7 +199,7 @@ mod tests {
         );
         assert_eq!(steps[1]["dependencies"][0]["dependsOn"], "Render");
         let args = &steps[0]["script"]["actions"]["onRun"]["args"];
-        assert_eq!(args.as_array().unwrap().last().unwrap(), "{{Task.Param.Frames}}");
+        assert_eq!(args.as_array().unwrap().last().unwrap(), "{{Task.Param.Parts}}");
         assert!(super::template(&words, &chunks(1025, 1)).is_err());
         assert!(super::template(&["walk".into(), "{{x".into()], &chunks(1, 1)).is_err());
     }

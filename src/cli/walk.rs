@@ -72,7 +72,10 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, Said { json, joins
     let checkpoints = measures.then(|| atomic::JsonLines::create(&output.join("checkpoints.jsonl")));
     let mut checkpoints = checkpoints.transpose()?;
     let progress = Progress::new();
-    let mut watcher = Watcher::new(&progress, stop, settings);
+    // Of what is joined parts are counted.
+    let counted_by =
+        Settings { frames: if joins { parts::count(settings) } else { settings.frames }, ..settings.clone() };
+    let mut watcher = Watcher::new(&progress, stop, &counted_by);
     let mut records: Vec<Record> = Vec::new();
     // Notes what a frame did, once its picture is written.
     let mut note_frame = |(own, measured): (Vec<Record>, Vec<Checkpoint>)| -> Result<()> {
@@ -91,9 +94,8 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, Said { json, joins
     let (mut finished, mut in_writing, mut failed) = (0, None, None);
     while finished < settings.frames && !stop.load(Ordering::Relaxed) {
         let preview = settings.progressive.then(|| pictures.preview());
-        let ready = joined.as_mut().and_then(|joined| joined.part(&session, finished));
-        let frame = match ready {
-            Some(part) => session.frame_of_part(part).map(Some),
+        let frame = match &mut joined {
+            Some(joined) => joined.frame(&mut session, (finished, preview), &mut watcher),
             None => session.frame_watched(finished, watcher.of_frame(finished, preview)),
         };
         let mut frame = match frame {
@@ -126,7 +128,7 @@ pub fn walk(scene: &Path, output: &Path, settings: &Settings, Said { json, joins
     session.write_requests()?;
     brickwalk_report::write(output, &fields())?;
     if let Some(joined) = joined.filter(|_| finished == settings.frames) {
-        joined.remove(settings.frames);
+        joined.remove(settings);
     }
     let frames = output.join("frames");
     let mut last = vec![format!("{}: {}", frames.display(), counted(finished.into(), "frame"))];

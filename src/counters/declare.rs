@@ -53,9 +53,16 @@ macro_rules! counters {
                 $(counters! { @add $kind self.$name, other.$name })*
             }
 
-            /// Keeps of sets how many are in them.
-            pub(super) fn count_sets(&mut self) {
-                $(counters! { @count $kind self.$name })*
+            /// Does something with every set of bricks.
+            pub(super) fn each_set(&mut self, work: impl Fn(&mut Bricks)) {
+                $(counters! { @each $kind work, self.$name })*
+            }
+
+            /// The sets of bricks that records have, by name.
+            pub(super) fn sets(&self) -> Vec<(&'static str, &Bricks)> {
+                let mut sets = Vec::new();
+                $(counters! { @set self sets $column $sum [$($unwritten)?] })*
+                sets
             }
 
             /// The names and values of what kernels count.
@@ -116,8 +123,10 @@ macro_rules! counters {
     (@add state $to:expr, $from:expr) => { let _ = $from; };
     (@add distinct $to:expr, $from:expr) => { $to.add(&$from); };
     (@add names $to:expr, $from:expr) => { $to.add(&$from); };
-    (@count distinct $to:expr) => { $to.forget(); };
-    (@count $kind:ident $to:expr) => {};
+    (@each distinct $work:ident, $set:expr) => { $work(&mut $set); };
+    (@each $kind:ident $work:ident, $set:expr) => {};
+    (@set $self:ident $sets:ident $name:ident distinct []) => { $sets.push((stringify!($name), &$self.$name)); };
+    (@set $self:ident $sets:ident $name:ident $sum:ident [$($unwritten:ident)?]) => {};
     (@entry $self:ident $map:ident $name:ident $sum:ident [unwritten]) => {};
     (@entry $self:ident $map:ident $name:ident derived []) => {
         $map.serialize_entry(stringify!($name), &$self.$name())?;
@@ -134,7 +143,7 @@ macro_rules! counters {
     (@read_one u64 $value:ident) => { $value.as_u64() };
     // What is no number is written as null.
     (@read_one f64 $value:ident) => { if $value.is_null() { Some(f64::NAN) } else { $value.as_f64() } };
-    (@read_one Bricks $value:ident) => { $value.as_u64().map(Bricks::of_count) };
+    (@read_one Bricks $value:ident) => { Bricks::of_value($value) };
     (@read_one Names $value:ident) => { $value.as_str().map(Names::of_text) };
     (@named $name:ident $word:ident) => { stringify!($name) };
     (@float f64) => { true };

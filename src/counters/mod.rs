@@ -112,9 +112,21 @@ impl Bricks {
         self.count.max(self.distinct().len() as u64)
     }
 
-    /// So many, of which it is not known which.
-    fn of_count(count: u64) -> Self {
-        Self { numbers: Vec::new(), count, is_known: true }
+    /// Those of a value that they were written as: their numbers, or how many there are.
+    fn of_value(value: &Value) -> Option<Self> {
+        let number = |one: &Value| one.as_u64()?.try_into().ok();
+        match value {
+            Value::Array(values) => {
+                let numbers = values.iter().map(number).collect::<Option<_>>()?;
+                Some(Self { numbers, count: 0, is_known: true })
+            }
+            count => Some(Self { numbers: Vec::new(), count: count.as_u64()?, is_known: true }),
+        }
+    }
+
+    /// Keeps each number once.
+    fn settle(&mut self) {
+        self.numbers = self.distinct();
     }
 
     /// Keeps how many there are, and forgets which.
@@ -199,11 +211,36 @@ impl Record {
         if !counters.bricks_needed.is_known() {
             counters.bricks_needed = counters.bricks_entered.clone();
         }
-        counters.count_sets();
+        counters.each_set(Bricks::settle);
         Self { frame, pass, counters }
     }
 
-    /// A line of `records.jsonl`; `None`: it is none.
+    /// Adds what later passes of the same effect did.
+    pub fn go_on(&mut self, later: &Self) {
+        let Counters { bricks_resident_end, cache_used_bytes, .. } = later.counters;
+        self.counters.add(&later.counters);
+        self.counters.each_set(Bricks::settle);
+        (self.bricks_resident_end, self.cache_used_bytes) = (bricks_resident_end, cache_used_bytes);
+    }
+
+    /// Keeps of sets of bricks how many there are, for as long as records are kept.
+    pub fn forget_bricks(&mut self) {
+        self.counters.each_set(Bricks::forget);
+    }
+
+    /// With the numbers of bricks in place of how many there are: what [`Record::go_on`] needs.
+    ///
+    /// # Errors
+    /// None that is known.
+    pub fn with_bricks(&self) -> serde_json::Result<Value> {
+        let mut value = serde_json::to_value(self)?;
+        for (name, bricks) in self.counters.sets() {
+            value[name] = serde_json::to_value(bricks.distinct())?;
+        }
+        Ok(value)
+    }
+
+    /// A line of `records.jsonl`, or what [`Record::with_bricks`] made; `None`: it is neither.
     pub fn read(line: &Value) -> Option<Self> {
         let record = line.as_object()?;
         let frame = record.get("frame")?.as_u64()?.try_into().ok()?;

@@ -5,8 +5,9 @@
 //! last band that lie below the picture have no rays.
 
 use super::FrameOutput;
+use crate::counters::Record;
 
-/// Where a band lies in its picture.
+/// How large a band and its picture are.
 #[derive(Clone, Copy, Debug)]
 pub struct Joint {
     /// Pixels of the band that the picture has.
@@ -30,9 +31,10 @@ impl Joint {
 }
 
 impl FrameOutput {
-    /// Adds what a band shows below what there is.
-    pub(super) fn append(&mut self, band: Self, joint: Joint) {
-        let Self { pixels, coverage, guides, .. } = band;
+    /// Adds what a band shows below what there is, and what its passes did.
+    pub fn append(&mut self, band: Self, joint: Joint) {
+        let Self { pixels, coverage, guides, records } = band;
+        records.into_iter().for_each(|record| self.add_record(record));
         joint.join(&mut self.pixels.radiance, pixels.radiance);
         joint.join(&mut self.pixels.depth, pixels.depth);
         joint.join(&mut self.pixels.normal, pixels.normal);
@@ -52,11 +54,20 @@ impl FrameOutput {
             joint.join(&mut all.second, second);
         }
     }
+
+    /// Adds what passes did to what those of the same effect did before.
+    fn add_record(&mut self, record: Record) {
+        match self.records.iter_mut().find(|own| own.pass == record.pass) {
+            Some(own) => own.go_on(&record),
+            None => self.records.push(record),
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::counters::Counters;
     use crate::frame::Pixels;
 
     #[test]
@@ -72,5 +83,24 @@ mod tests {
         assert_eq!(all.coverage, [true, true, true, true, false, false]);
         assert!(all.pixels.depth.is_empty() && all.guides.is_none());
         assert_eq!(all.pixels.radiance.capacity(), 6);
+    }
+
+    #[test]
+    fn bands_count_for_the_effects_of_their_picture() {
+        let band = |passes: &[&'static str], bricks: &[u32]| {
+            let record = |&pass: &&'static str| {
+                let mut counters = Counters { rays_traced: 4, bricks_resident_end: 7, ..Counters::default() };
+                counters.bricks_hit.extend(bricks.iter().copied());
+                Record::of(3, pass, counters)
+            };
+            FrameOutput { records: passes.iter().map(record).collect(), ..FrameOutput::default() }
+        };
+        let mut all = FrameOutput::default();
+        let joint = Joint { band: 1, picture: 2 };
+        all.append(band(&["primary", "ao"], &[1, 2]), joint);
+        all.append(band(&["primary", "shadow"], &[2, 3]), joint);
+        let found: Vec<_> = all.records.iter().map(|r| (r.pass, r.rays_traced, r.bricks_hit.count())).collect();
+        assert_eq!(found, [("primary", 8, 3), ("ao", 4, 2), ("shadow", 4, 2)]);
+        assert_eq!(all.records[0].bricks_resident_end, 7);
     }
 }

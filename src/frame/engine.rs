@@ -71,6 +71,8 @@ pub struct Engine {
     /// Rows that are rendered at a time, which the executor has room for: those of the picture, or of a band of it,
     /// whole tiles.
     pub band_rows: u32,
+    /// The rows that are rendered, from the edge of a tile on; `None`: all of the picture's.
+    pub only_rows: Option<Range<u32>>,
     /// Edge of a tile in pixels.
     pub tile: u32,
     /// The temporal fronts, when they are on.
@@ -89,10 +91,16 @@ pub struct Engine {
 }
 
 impl Engine {
+    /// The rows that are rendered.
+    pub fn rows(&self) -> Range<u32> {
+        self.only_rows.clone().unwrap_or(0..self.size.1)
+    }
+
     /// The rows of the bands that pictures are rendered in, from the top; one band has them all.
     pub fn bands(&self) -> impl ExactSizeIterator<Item = Range<u32>> + use<> {
-        let (height, rows) = (self.size.1, self.band_rows);
-        (0..height.div_ceil(rows)).map(move |band| band * rows..((band + 1) * rows).min(height))
+        let (Range { start, end }, rows) = (self.rows(), self.band_rows);
+        let first = move |band| start + band * rows;
+        (0..(end - start).div_ceil(rows)).map(move |band| first(band)..first(band + 1).min(end))
     }
 
     /// Whether what levels of detail show is corrected.

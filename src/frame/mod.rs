@@ -28,6 +28,7 @@ mod voxels;
 
 pub use accumulate::{Accumulation, BATCH_SAMPLES};
 pub use answers::{Answered, Answers};
+pub use bands::Joint;
 pub use budget::Budgeted;
 pub use capture::{Captures, EffectError};
 pub use effects::{Effects, Occlusion};

@@ -140,7 +140,7 @@ impl Renderer {
         let mut records = FrameRecords::new(frame);
         engine.executor.set_lamps(&engine.light.lamps)?;
         let width = engine.size.0 as usize;
-        let picture = width * engine.size.1 as usize;
+        let picture = width * engine.rows().len();
         for rows in engine.bands() {
             let joint = Joint { band: width * rows.len(), picture };
             let band = Band { frame, camera, first_row: rows.start, checkpoints };
@@ -184,7 +184,8 @@ fn exact_blocks(
     let lod = Lod { pixels: 0.0, ..settings.lod };
     engine.settings = RenderSettings { lod, only_chosen: true, aov: false, guides: false, coverage: false, ..settings };
     let mut output = FrameOutput::default();
-    let (width, picture) = (engine.size.0 as usize, engine.size.0 as usize * engine.size.1 as usize);
+    let width = engine.size.0 as usize;
+    let picture = width * engine.rows().len();
     let rendered = engine.bands().try_for_each(|rows| {
         let joint = Joint { band: width * rows.len(), picture };
         let band = Band { frame, camera, first_row: rows.start, checkpoints: &[] };

@@ -7,6 +7,7 @@ use crate::cpu;
 use crate::session::Settings;
 use crate::settings::sizes::{human_bytes, human_count};
 use anyhow::{Result, bail};
+use std::ops::Range;
 
 /// Of the memory that joined pictures leave, a band takes at most one part of so many: the cache is to have most of it.
 const SHARE: u64 = 4;
@@ -72,6 +73,19 @@ impl Pool {
     }
 }
 
+/// Rows of tiles of a band, of so many rows of tiles, in as few bands as that leaves: no band is much smaller.
+fn even(all: u64, most: u64) -> u64 {
+    all.div_ceil(all.div_ceil(most.max(1)).max(1))
+}
+
+/// The rows of the bands that settings ask for, where memory needs no more of them.
+pub fn asked(settings: &Settings) -> Vec<Range<u32>> {
+    let (height, tile) = (settings.size.height, settings.tile);
+    let all = height.div_ceil(tile);
+    let rows = even(all.into(), all.div_ceil(settings.bands.clamp(1, all.max(1))).into()) as u32 * tile;
+    (0..height).step_by(rows.max(1) as usize).map(|first| first..(first + rows).min(height)).collect()
+}
+
 impl Bands {
     /// As many as `settings` ask for, or as the memory of `device` and of the host need; `has_more`: for a scene with
     /// further textures.
@@ -120,8 +134,7 @@ impl Bands {
                 room = Some(left / 2);
             }
         }
-        let bands = all.div_ceil(most.max(1));
-        let rows = (all.div_ceil(bands) * tile).min(height) as u32;
+        let rows = (even(all, most) * tile).min(height) as u32;
         let why = match short {
             _ if fits => None,
             Some(pool) => Some(format!(
@@ -232,6 +245,13 @@ mod tests {
         let rows = |options: &str| bands(options, Some(1 << 40)).unwrap().rows;
         let found = ["1", "2", "3", "4", "12", "1000"].map(|count| rows(&format!("--bands {count}")));
         assert_eq!(found, [720, 384, 256, 192, 64, 64]);
+        for count in 1..14 {
+            let settings = settings(&format!("--bands {count}"));
+            let asked = asked(&settings);
+            let rows = Bands::within(&settings, &pools(&settings, Some(1 << 40)), u64::MAX).unwrap().rows;
+            assert!(asked.iter().all(|own| own.start.is_multiple_of(64)) && asked[0] == (0..rows), "{count}");
+            assert!(asked.is_sorted_by(|a, b| a.end == b.start) && asked.last().unwrap().end == 720, "{count}");
+        }
         assert_eq!(rows("--bands 7 --tile 8 --size 64x100"), 16);
         assert_eq!(rows("--bands 7 --tile 512 --size 64x100"), 100);
         // Methods need the whole picture; a session refuses both together.

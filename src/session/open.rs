@@ -119,7 +119,8 @@ pub fn developed(radiance: &[[f32; 3]], stops: f64, tone_map: ToneMap) -> Vec<[u
     srgb::pixels(&shown)
 }
 
-/// A frame as it is without any other.
+/// A frame, or a band of it, as it is without any other.
+#[derive(Default)]
 pub(super) struct Rendered {
     pub output: FrameOutput,
     pub checkpoints: Vec<Checkpoint>,
@@ -347,6 +348,7 @@ impl Session {
     pub(super) fn go_on_with(&mut self, number: u32, rendered: Rendered) -> Result<Frame> {
         let Rendered { mut output, checkpoints } = rendered;
         let renderer = &mut self.renderer;
+        output.records.iter_mut().for_each(Record::forget_bricks);
         self.resolve.frame_on(&mut renderer.engine, &mut output).with_context(|| self.file.display().to_string())?;
         let seconds = self.path.frame_time(self.settings.frames);
         let stops = self.meter.stops(&output.pixels.radiance, &output.coverage, seconds);

@@ -48,6 +48,7 @@ pub fn lit_renderer(opened: Opened, settings: &Settings, light: Light) -> Render
         light,
         size: (settings.size.width, settings.size.height),
         band_rows: extent.height,
+        only_rows: None,
         tile: extent.tile,
         #[cfg(feature = "lab")]
         fronts: settings.fronts.then(Fronts::default),

@@ -32,6 +32,7 @@ mod command {
 /// the motion.
 mod exact {
     mod bands;
+    mod bucket;
     mod budget;
     mod cache_independence;
     mod clip;

@@ -19,7 +19,7 @@ if [ ! -x "$environment/bin/python" ]; then
     "$python" -m venv "$environment"
 fi
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check \
-    'maturin>=1.8,<2' numpy pytest hypothesis trimesh rtree scipy pillow 'moto[server]'
+    'maturin>=1.8,<2' numpy pytest hypothesis trimesh rtree scipy pillow 'moto[server]' trustme
 
 # What the library is made of goes into the wheel.
 host=$(rustc -vV | sed -n 's/^host: //p')

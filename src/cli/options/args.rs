@@ -5,7 +5,7 @@
 use super::group_args::OfView;
 use super::group_args::{GroupArgs, OfTrace, OfWalk};
 use super::inputs::{FromArgs, InputArgs};
-use super::job_args::{FrameRange, JobsArgs};
+use super::job_args::{JobsArgs, PartRange};
 use super::query_args::QueryArgs;
 use super::scene_kind::{SceneKind, scene_help};
 use super::scene_name::scene_name;
@@ -474,11 +474,11 @@ pub struct WalkArgs {
     pub json: bool,
     /// Render frame N, or FIRST to LAST, apart from the others, into DIR/parts, for --join [default: none]
     ///
-    /// Any machine may render any part, in any order; the commands differ in this option alone. What is there and whole
-    /// is not rendered again.
+    /// With --bands B a frame is B parts: N is band N mod B of frame N / B, from the top. Any machine may render any
+    /// part, in any order; the commands differ in this option alone. What is there and whole is not rendered again.
     #[arg(long, value_name = "N|FIRST-LAST", conflicts_with_all = ["join", "json"], hide_short_help = true,
         hide_long_help = true)]
-    pub part: Option<FrameRange>,
+    pub part: Option<PartRange>,
     /// Take frames from DIR/parts, and render those that are missing there; removes the parts at the end
     ///
     /// Frames are, byte for byte, those of one walk on the machine that joins them, if the parts come from a device

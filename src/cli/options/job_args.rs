@@ -1,31 +1,31 @@
-//! Options of what is split over many machines: ranges of frames, and `jobs`.
+//! Options of what is split over many machines: ranges of parts, and `jobs`.
 
 use super::units::UNITS;
 use clap::Args;
 use std::fmt;
 use std::str::FromStr;
 
-/// Frames of a walk, from 0, both ends among them.
+/// Parts of a walk, from 0, both ends among them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FrameRange {
+pub struct PartRange {
     /// The first.
     pub first: u32,
     /// The last.
     pub last: u32,
 }
 
-impl FromStr for FrameRange {
+impl FromStr for PartRange {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("{text:?} is no number of a frame"));
+        let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("{text:?} is no number of a part"));
         let (first, last) = text.split_once('-').unwrap_or((text, text));
         let range = Self { first: number(first)?, last: number(last)? };
-        if range.first <= range.last { Ok(range) } else { Err("the first frame comes after the last one".into()) }
+        if range.first <= range.last { Ok(range) } else { Err("the first comes after the last".into()) }
     }
 }
 
-impl fmt::Display for FrameRange {
+impl fmt::Display for PartRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.first == self.last {
             true => write!(f, "{}", self.first),
@@ -45,7 +45,7 @@ pub struct JobsArgs {
     /// if it is a model, the folder, the number of frames, and the settings as a TOML file.
     #[arg(long, value_enum)]
     pub format: JobFormat,
-    /// Frames that a task renders [1 to 1000000]
+    /// Frames that a task renders; with --bands, bands of frames [1 to 1000000]
     ///
     /// The scene is opened anew for each. More of them open it less often; fewer lose less when a machine fails.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]

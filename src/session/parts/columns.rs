@@ -66,12 +66,16 @@ pub fn push(arrays: &mut Writing, guides: &Guides) {
     arrays.push("second.light", &seconds.iter().map(|second| second.light).collect::<Vec<_>>());
 }
 
-/// Guides of a picture of this size by `camera`, in which nothing has moved.
+/// Guides of so many pixels of a picture of this size by `camera`, in which nothing has moved.
 ///
 /// # Errors
 /// An array is not of this size.
-pub fn read(read: &Read, size: (u32, u32), camera: &Camera, (jitter, seconds): Sampled) -> Result<Guides> {
-    let pixels = size.0 as usize * size.1 as usize;
+pub fn read(
+    read: &Read,
+    (size, pixels): ((u32, u32), usize),
+    camera: &Camera,
+    (jitter, seconds): Sampled,
+) -> Result<Guides> {
     let light: Vec<[f32; 3]> = read.array("second.light", seconds)?;
     let surfaces = read_seen(read, "second", seconds)?;
     let second: Vec<Second> = surfaces.into_iter().zip(light).map(|(seen, light)| Second { seen, light }).collect();

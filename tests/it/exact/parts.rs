@@ -1,5 +1,5 @@
-//! Frames that are rendered apart, in any order and by several processes, join to the walk of one process, byte by
-//! byte; what is damaged or of another walk is rendered again.
+//! Frames, and bands of them, that are rendered apart, in any order and by several processes, join to the walk of one
+//! process, byte by byte; what is damaged or of another walk is rendered again.
 
 use super::motion::{MOTION, convert, source};
 use crate::common::{self, adapters, city, folder, frames, json, records};
@@ -65,7 +65,7 @@ fn parts_join_to_the_walk_of_one_process() {
             let summary = json(&joined.join("summary.json"));
             assert_eq!((&summary["parts"]["joined"], &summary["frames"]), (&4.into(), &5.into()));
             let workers = summary["parts"]["workers"].as_array().expect("workers");
-            assert_eq!(workers.iter().map(|worker| worker["frames"].as_u64()).sum::<Option<u64>>(), Some(4));
+            assert_eq!(workers.iter().map(|worker| worker["parts"].as_u64()).sum::<Option<u64>>(), Some(4));
             assert_eq!(workers.len(), 3);
             let page = std::fs::read_to_string(joined.join("report.html")).expect("a report");
             assert!(page.contains(workers[0]["worker"].as_str().expect("a name")));
@@ -93,8 +93,8 @@ fn a_frame_that_is_joined_without_those_before_it_is_another() {
     }
     let mut joined = open();
     let next = |session: &mut Session, number| {
-        let part = session.read_part(&output, number, &key).expect("a part");
-        session.frame_of_part(part).expect("a frame")
+        let read = |session: &mut Session, number| session.read_part(&output, number, &key).map(Some);
+        session.frame_of_parts(number, read).expect("a frame").expect("nobody stopped it")
     };
     for frame in &whole {
         let own = next(&mut joined, frame.number);
@@ -102,6 +102,53 @@ fn a_frame_that_is_joined_without_those_before_it_is_another() {
     }
     let alone = next(&mut open(), 2);
     assert!(alone.pixels.radiance != whole[2].pixels.radiance && alone.exposure_ev != whole[2].exposure_ev);
+}
+
+/// Of the records of a walk what no cache and no band changes: effects in their order, rays, and which bricks were hit.
+fn counted(output: &Path) -> Vec<[String; 4]> {
+    let keys = ["frame", "pass", "rays_traced", "bricks_hit"];
+    let of = |record: &serde_json::Value| keys.map(|key| record[key].to_string());
+    records(output).iter().map(of).collect()
+}
+
+#[test]
+fn bands_of_one_picture_are_rendered_apart() {
+    let folder = folder();
+    let scene = city(folder.path(), "10K", "1000");
+    let moving = convert(folder.path(), "moving.bricks", source(None, false));
+    let motion = folder.path().join("motion.json");
+    std::fs::write(&motion, MOTION).expect("a file");
+    let near = scene.with_extension("near.json");
+    // Five rows of tiles, in bands of two and one.
+    let view = "--frames 2 --size 40x72 --tile 16 --bands 3 --adapter cpu --quality draft";
+    let variants = [
+        (&scene, format!("{view} --path {} --denoise --aov --spp 2", near.display())),
+        (&scene, format!("{view} --path {} --effects diffuse --diffuse-rays 2 --bounces 4", near.display())),
+        (&moving, format!("{view} --motion {} --denoise --taa", motion.display())),
+    ];
+    for (scene, options) in &variants {
+        let [whole, joined] = ["whole", "joined"].map(|name| folder.path().join(name));
+        walk(scene, &whole, options);
+        // Of the second frame the band in the middle is missing, and rendered where the others are joined.
+        for part in ["5", "0-1", "2-3"] {
+            walk(scene, &joined, &format!("{options} --part {part}"));
+        }
+        walk(scene, &joined, &format!("{options} --join"));
+        assert!(frames(&joined) == frames(&whole), "{options}: joined bands differ");
+        assert_eq!(counted(&joined), counted(&whole), "{options}");
+        assert_eq!(json(&joined.join("summary.json"))["parts"]["joined"], 5);
+        assert!(!parts::folder(&joined).exists(), "parts stay");
+        // The control: bands of other frames make another picture.
+        walk(scene, &joined, &format!("{options} --part 0-5"));
+        let [one, other] = [0, 3].map(|number| std::fs::read(parts::file(&joined, number)).expect("a part"));
+        assert_ne!(one, other);
+    }
+    let words = |more: &str| words(&scene, &folder.path().join("out"), &format!("{view} {more}"));
+    for (more, named) in [("--part 6", "6 bands, from 0"), ("--part 0 --lod 1 --lod-correct 4", "--lod-correct")] {
+        let done = common::brickwalk(words(more));
+        assert_eq!(done.status.code(), Some(2));
+        assert!(String::from_utf8_lossy(&done.stderr).contains(named));
+    }
 }
 
 #[test]
@@ -132,7 +179,7 @@ fn what_is_damaged_or_of_another_walk_is_rendered_again() {
     let done = common::brickwalk(words("--join"));
     let said = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success(), "{said}");
-    assert!(said.contains("0001.part: this is a part of another walk") && said.contains("frame 1 is"), "{said}");
+    assert!(said.contains("0001.part: this is a part of another walk") && said.contains("part 1 is"), "{said}");
     assert!(said.contains("0002.part: this file is cut off or damaged"), "{said}");
     assert!(frames(&joined) == frames(&whole));
     assert_eq!(json(&joined.join("summary.json"))["parts"]["joined"], 2);

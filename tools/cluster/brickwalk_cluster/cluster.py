@@ -16,6 +16,7 @@ from distributed.scheduler import KilledWorker
 
 #: A task goes to another worker so many times when its worker dies.
 DEATHS = 10
+GONE = "the scheduler went away; the same command goes on where this one stopped"
 
 
 class Failed(Exception):
@@ -67,8 +68,11 @@ class Cluster:
         return psutil.virtual_memory().available // (3 * self.workers) if self.is_local else None
 
     def addresses(self) -> list[str]:
-        """The workers, in one order."""
-        return sorted(self.client.scheduler_info(n_workers=-1)["workers"])
+        """The workers, in one order. Raises :class:`Failed` if the scheduler is gone."""
+        try:
+            return sorted(self.client.scheduler_info(n_workers=-1)["workers"])
+        except Exception as error:
+            raise Failed(GONE) from error
 
     def wait_for_workers(self, seconds: float = 60.0) -> None:
         """Waits until there is one."""
@@ -104,15 +108,17 @@ def results(client: Client, futures: Iterable[Future]) -> Iterator[Any]:
             except Failed:
                 raise
             except Exception as error:
-                if future.cancelled() or future.status == "lost":
-                    text = "the scheduler went away; the same command goes on where this one stopped"
-                    raise Failed(text) from error
-                raise Failed(one_line(error)) from error
+                raise Failed(one_line(error) if is_own_error(future) else GONE) from error
     finally:
         try:
             client.cancel(futures, force=True)
         except Exception:  # The scheduler is gone, and its tasks with it.
             pass
+
+
+def is_own_error(future: Future) -> bool:
+    """Whether what waiting for ``future`` raised came from its task; else the connection to the scheduler broke."""
+    return bool(future.status == "error")
 
 
 def one_line(error: BaseException) -> str:

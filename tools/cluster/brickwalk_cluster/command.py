@@ -51,7 +51,7 @@ def parser() -> argparse.ArgumentParser:
 
     one = add("walk", "render frames along a camera path", "S.bricks -o DIR")
     one.add_argument(
-        "--chunk", type=_count, metavar="N", help="frames that a task renders [default: eight tasks a worker]"
+        "--chunk", type=_count, metavar="N", help="frames, or --bands of them, of a task [default: eight tasks a worker]"
     )
     one.add_argument("--disk-cache", metavar="DIR,SIZE", help="keep parts of scenes from URLs in a folder")
     add("study", "measure error against run time, an effect a task", "S.bricks -o DIR")
@@ -113,7 +113,8 @@ def _do(options: argparse.Namespace, rest: list[str], cluster: Cluster) -> str:
         done = walk(cluster, rest, chunk=options.chunk, disk_cache=options.disk_cache, is_quiet=options.quiet)
         for warning in [] if options.quiet else done["warnings"]:
             sys.stderr.write(f"brickwalk-cluster: {warning}\n")
-        text = f"{done['frames']} frames, {done['rendered']} rendered now in {done['seconds']:.1f} s of workers"
+        parts = "" if done["parts"] == done["frames"] else f" of {done['parts']} bands"
+        text = f"{done['frames']} frames{parts}, {done['rendered']} rendered now in {done['seconds']:.1f} s of workers"
         return f"{text}, {done['bytes_loaded'] / 1e6:.0f} MB loaded"
     if options.command == "convert":
         return _convert(options, cluster)

@@ -16,6 +16,8 @@ import brickwalk
 from brickwalk._brickwalk import ConversionWorker, convert_shared
 from brickwalk._convert import checked
 
+from .cluster import GONE, is_own_error
+
 Path = str | os.PathLike[str]
 
 # How often a task that raises is done again elsewhere: a worker may not see yet what another has written.
@@ -108,6 +110,10 @@ def _is_done(future: Future) -> bool:
             f"task {error.task}: workers died with it more often than distributed.scheduler.allowed-failures; raise "
             "that, or give workers more memory"
         ) from None
+    except Exception as error:
+        if is_own_error(future):
+            raise
+        raise brickwalk.BrickwalkError(GONE) from error
     return True
 
 

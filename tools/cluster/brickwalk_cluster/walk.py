@@ -1,4 +1,4 @@
-"""A walk: ranges of frames as tasks, and what joins them.
+"""A walk: ranges of frames, or of bands of frames, as tasks, and what joins them.
 
 A frame is rendered up to where earlier frames come in: filters and exposure. What joins the parts does these in the
 order of the frames, so that the pictures are those of one machine (docs/cluster.md).
@@ -38,6 +38,7 @@ class Job:
     output: str
     settings: str
     frames: int
+    parts: int
     key: str
     disk_cache: str | None = None
 
@@ -58,6 +59,7 @@ def job(words: Sequence[str], disk_cache: str | None = None) -> Job:
         found["output"],
         found["settings"],
         found["frames"],
+        found.get("parts", 0),
         found.get("key", ""),
         disk_cache,
     )
@@ -83,12 +85,12 @@ def _opened(job: Job) -> WalkParts:
     return parts
 
 
-def _render(job: Job, frames: list[int], log: str | None = None) -> dict[str, Any]:
-    """A task: renders frames, but for those that are there and whole. Returns what it took."""
+def _render(job: Job, numbers: list[int], log: str | None = None) -> dict[str, Any]:
+    """A task: renders parts, but for those that are there and whole. Returns what it took."""
     try:
         parts = _opened(job)
         rows = []
-        for number in frames:
+        for number in numbers:
             row = parts.render(job.output, number, None)
             rows.append(row)
             if log is not None and row["is_new"]:
@@ -97,16 +99,16 @@ def _render(job: Job, frames: list[int], log: str | None = None) -> dict[str, An
     except (BrickwalkError, OSError, ValueError) as error:
         raise Failed(" ".join(str(error).split())) from error
     return {
-        "frames": len(rows),
+        "parts": len(rows),
         "rendered": sum(row["is_new"] for row in rows),
         **{name: sum(row[name] for row in rows) for name in SUMS},
         "warnings": sorted({warning for row in rows for warning in row["warnings"]}),
     }
 
 
-def ranges(frames: int, chunk: int) -> list[list[int]]:
-    """All frames, ``chunk`` neighbours at a time: neighbours need much the same bricks."""
-    return [list(range(first, min(first + chunk, frames))) for first in range(0, frames, chunk)]
+def ranges(parts: int, chunk: int) -> list[list[int]]:
+    """All parts, ``chunk`` neighbours at a time: neighbours need much the same bricks."""
+    return [list(range(first, min(first + chunk, parts))) for first in range(0, parts, chunk)]
 
 
 def is_done(output: str | os.PathLike[str], key: str) -> bool:
@@ -145,9 +147,10 @@ def walk(
 ) -> dict[str, Any]:
     """Renders the walk of ``words`` on the workers of ``cluster`` and joins it here.
 
-    ``chunk`` is how many frames a task has; by default each worker gets about eight tasks. ``log`` is a file that gets
-    the number of each frame that is rendered, a line each. Returns what was done: frames, those that were rendered,
-    seconds of workers, bytes loaded; of a scene by URL requests, bytes fetched and seconds of waiting for them.
+    A part is a frame or, with ``--bands``, a band of one. ``chunk`` is how many parts a task has; by default each worker
+    gets about eight tasks. ``log`` is a file that gets the number of each part that is rendered, a line each. Returns
+    what was done: frames, parts, those that were rendered, seconds of workers, bytes loaded; of a scene by URL
+    requests, bytes fetched and seconds of waiting for them.
 
     Raises :class:`Failed`.
     """
@@ -161,14 +164,15 @@ def walk(
         raise Failed(f"{program()} and the package brickwalk are of different commits; install both from one")
     key = identity(parts.key, own.settings)
     if is_done(own.output, key):
-        return {"key": key, "frames": own.frames, "rendered": 0, **dict.fromkeys(SUMS, 0), "warnings": []}
+        none = {"parts": own.parts, "rendered": 0}
+        return {"key": key, "frames": own.frames, **none, **dict.fromkeys(SUMS, 0), "warnings": []}
     share = cluster.share_of_memory()
     split = own if share is None else Job(**{**own.__dict__, "settings": _with_cache(own.settings, share)})
     cluster.wait_for_workers()
     addresses = cluster.addresses()
-    tasks = ranges(own.frames, chunk or max(1, -(-own.frames // (8 * len(addresses)))))
-    progress = Progress("frames", own.frames, is_quiet)
-    total: dict[str, Any] = {"key": key, "frames": 0, "rendered": 0, **dict.fromkeys(SUMS, 0)}
+    tasks = ranges(own.parts, chunk or max(1, -(-own.parts // (8 * len(addresses)))))
+    progress = Progress("frames" if own.parts == own.frames else "bands", own.parts, is_quiet)
+    total: dict[str, Any] = {"key": key, "frames": own.frames, "parts": 0, "rendered": 0, **dict.fromkeys(SUMS, 0)}
     warnings: set[str] = set()
     # Each worker begins on a stretch of the path of its own: bricks of one task are those of the next.
     stretch = -(-len(tasks) // len(addresses))
@@ -176,19 +180,19 @@ def walk(
         cluster.client.submit(
             _render,
             split,
-            frames,
+            numbers,
             log,
             pure=False,
             workers=[addresses[number // stretch]],
             allow_other_workers=True,
         )
-        for number, frames in enumerate(tasks)
+        for number, numbers in enumerate(tasks)
     ]
     for row in results(cluster.client, futures):
-        for name in ("frames", "rendered", *SUMS):
+        for name in ("parts", "rendered", *SUMS):
             total[name] += row[name]
         warnings.update(row["warnings"])
-        progress.advance(row["frames"], len(cluster.addresses()))
+        progress.advance(row["parts"], len(cluster.addresses()))
     join(words, disk_cache, is_quiet)
     frames = sorted((Path(own.output) / "frames").glob("*.*"))
     listed = {f"frames/{path.name}": _hash(path) for path in frames}

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from conftest import Elsewhere
 
 import brickwalk
 
@@ -26,6 +27,8 @@ from distributed import Client, LocalCluster  # noqa: E402
 from distributed.core import Status  # noqa: E402
 
 from brickwalk_cluster import conversion  # noqa: E402
+from brickwalk_cluster.cluster import GONE  # noqa: E402
+from brickwalk_cluster.command import run as command  # noqa: E402
 
 WORKERS = 4
 
@@ -194,6 +197,19 @@ def test_a_killed_leader_goes_on_where_it_was(client, model, tmp_path, until):
     assert out.read_bytes() == one
     assert all(before[name] == time for name, time in seen.items()), "what verifies is not made again"
     assert not scratch.exists()
+
+
+def test_a_scheduler_that_dies_ends_a_conversion_that_goes_on_later(model, tmp_path):
+    one = alone(model, tmp_path / "one.bricks", **LITTLE)
+    out, scratch = tmp_path / "many.bricks", tmp_path / ".many.bricks.scratch"
+    line = ["convert", str(model), "-o", str(out), "--memory", "90M", "--brick-triangles", "4000"]
+    with Elsewhere(tmp_path) as cluster:
+        status, said = cluster.dies_during(line, lambda: list(scratch.glob("triangles-*[0-9]")))
+        assert status == 1 and GONE in said and "Traceback" not in said, said
+    assert not out.exists() and (scratch / "journal").exists()
+    with Elsewhere(tmp_path) as cluster:
+        assert command([*line, "--scheduler", cluster.address, "-q"]) == 0
+    assert out.read_bytes() == one and not scratch.exists()
 
 
 def test_damaged_outputs_are_made_again(client, model, tmp_path):

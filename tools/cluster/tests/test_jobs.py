@@ -44,6 +44,19 @@ def test_each_line_runs_by_itself(city, program, whole, tmp_path):
     assert frames(tmp_path / "it's out") == whole
 
 
+def test_bands_are_lines_of_their_own(city, program, run, tmp_path):
+    view = ["--size", "64x128", "--bands", "2", "--quality", "draft", "--adapter", "cpu"]
+    run("walk", city, "-o", tmp_path / "whole", *view)
+    line = [program, "jobs", "--format", "lines", "--chunk", "1", "--", "-q", "walk", str(city), "-o", "out", *view]
+    lines = subprocess.run(line, cwd=tmp_path, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()
+    assert [line.split()[-2:] for line in lines[:-1]] == [["--part", "0"], ["--part", "1"]]
+    for line in reversed(lines[:-1]):
+        subprocess.run(["sh", "-c", line], cwd=tmp_path, env=environment(program), check=True)
+    subprocess.run(["sh", "-c", lines[-1]], cwd=tmp_path, env=environment(program), check=True)
+    assert frames(tmp_path / "out") == frames(tmp_path / "whole")
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["parts"]["joined"] == 2
+
+
 def test_the_template_is_checked_and_runs(city, program, whole, tmp_path):
     tool = shutil.which("openjd") or os.path.join(os.path.dirname(sys.executable), "openjd")
     template = tmp_path / "job.json"

@@ -12,9 +12,11 @@ from collections import Counter
 
 import psutil
 import pytest
-from conftest import frames
+from conftest import Elsewhere, frames
+from distributed import Future
 
 from brickwalk_cluster import Cluster, Failed, walk
+from brickwalk_cluster.cluster import GONE, results
 from brickwalk_cluster.command import run as command
 from brickwalk_cluster.walk import DONE, identity, is_done, ranges
 
@@ -34,7 +36,7 @@ def words(city, output):
     return [str(city), "-o", str(output), *VIEW]
 
 
-def test_ranges_have_every_frame_once():
+def test_ranges_have_every_part_once():
     for count, chunk in [(1, 1), (60, 7), (5, 100)]:
         assert sum(ranges(count, chunk), []) == list(range(count))
 
@@ -49,7 +51,7 @@ def test_frames_are_those_of_one_machine(city, whole, tmp_path, workers):
         assert Counter(log.read_text().split()) == Counter(map(str, range(60)))
         summary = json.loads((tmp_path / "summary.json").read_text())
         rows = summary["parts"]["workers"]
-        assert len(rows) == workers and sum(row["frames"] for row in rows) == 60
+        assert len(rows) == workers and sum(row["parts"] for row in rows) == 60
         assert len((tmp_path / "records.jsonl").read_text().splitlines()) >= 60
         # A rerun finds that all is there; a picture that was changed is made again.
         assert walk(cluster, words(city, tmp_path), is_quiet=True)["rendered"] == 0
@@ -118,55 +120,52 @@ def test_a_scheduler_that_is_killed_loses_nothing(city, whole, tmp_path, program
 
 
 def test_a_scheduler_elsewhere_that_goes_away_and_comes_back(city, whole, tmp_path):
-    def start():
-        words = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
-        file = tmp_path / f"scheduler-{time.monotonic_ns()}.json"
-        scheduler = subprocess.Popen([*words, "--scheduler-file", str(file)], stderr=subprocess.DEVNULL)
-        workers = [
-            sys.executable,
-            "-m",
-            "distributed.cli.dask_worker",
-            "--scheduler-file",
-            str(file),
-            "--nthreads",
-            "1",
-        ]
-        workers += ["--nworkers", "2", "--memory-limit", "0", "--no-dashboard", "--death-timeout", "20"]
-        worker = subprocess.Popen(workers, stderr=subprocess.DEVNULL, start_new_session=True)
-        deadline = time.monotonic() + 60
-        while not file.exists() or not file.read_text().strip():
-            assert time.monotonic() < deadline and scheduler.poll() is None
-            time.sleep(0.05)
-        return scheduler, worker, json.loads(file.read_text())["address"]
-
-    def end(*processes):
-        for process in processes:
-            try:
-                os.killpg(process.pid, signal.SIGKILL) if process is not processes[0] else process.kill()
-            except ProcessLookupError:
-                pass
-            process.wait()
-
-    scheduler, worker, address = start()
     parts = tmp_path / "out" / "parts"
-    line = [sys.executable, "-m", "brickwalk_cluster.command", "walk", *words(city, tmp_path / "out"), "--chunk", "2"]
-    try:
-        process = subprocess.Popen([*line, "--scheduler", address], stderr=subprocess.PIPE, text=True)
-        deadline = time.monotonic() + 120
-        while not parts.is_dir() or len(list(parts.glob("*.part"))) < 6:
-            assert process.poll() is None and time.monotonic() < deadline
-            time.sleep(0.02)
-        scheduler.kill()
-        _, said = process.communicate(timeout=120)
-        assert process.returncode == 1 and "goes on where this one stopped" in said, said
-    finally:
-        end(scheduler, worker)
-    scheduler, worker, address = start()
-    try:
-        assert command(["walk", *words(city, tmp_path / "out"), "--chunk", "2", "--scheduler", address, "-q"]) == 0
-    finally:
-        end(scheduler, worker)
+    line = ["walk", *words(city, tmp_path / "out"), "--chunk", "2"]
+    with Elsewhere(tmp_path) as cluster:
+        status, said = cluster.dies_during(line, lambda: len(list(parts.glob("*.part"))) >= 6)
+        assert status == 1 and GONE in said and "Traceback" not in said, said
+    with Elsewhere(tmp_path) as cluster:
+        assert command([*line, "--scheduler", cluster.address, "-q"]) == 0
     assert frames(tmp_path / "out") == whole
+
+
+def test_a_connection_that_breaks_is_told_from_a_task_that_fails(monkeypatch):
+    def fails():
+        raise OSError("of the task")
+
+    with Cluster(workers=1) as cluster:
+        with pytest.raises(Failed, match="of the task"):
+            list(results(cluster.client, [cluster.client.submit(fails, pure=False)]))
+
+        def broken(self, timeout=None):
+            raise ConnectionResetError(104, "Connection reset by peer")
+
+        future = cluster.client.submit(abs, -7, pure=False)
+        assert list(results(cluster.client, [future])) == [7]
+        future = cluster.client.submit(abs, -8, pure=False)
+        monkeypatch.setattr(Future, "result", broken)
+        with pytest.raises(Failed, match=GONE):
+            list(results(cluster.client, [future]))
+        monkeypatch.undo()
+        assert len(cluster.addresses()) == 1
+        monkeypatch.setattr(type(cluster.client), "scheduler_info", broken)
+        with pytest.raises(Failed, match=GONE):
+            cluster.addresses()
+
+
+def test_bands_of_one_picture_are_rendered_by_several_workers(city, run, tmp_path):
+    view = ["--size", "128x256", "--bands", "4", "--frames", "2", "--adapter", "cpu", "--aov"]
+    run("walk", city, "-o", tmp_path / "whole", *view)
+    log = tmp_path / "log"
+    with Cluster(workers=2) as cluster:
+        line = [str(city), "-o", str(tmp_path / "out"), *view]
+        done = walk(cluster, line, chunk=1, is_quiet=True, log=str(log))
+        assert (done["frames"], done["parts"], done["rendered"]) == (2, 8, 8)
+    assert frames(tmp_path / "out") == frames(tmp_path / "whole")
+    assert Counter(log.read_text().split()) == Counter(map(str, range(8)))
+    rows = json.loads((tmp_path / "out" / "summary.json").read_text())["parts"]["workers"]
+    assert sum(row["parts"] for row in rows) == 8 and len(rows) == 2
 
 
 def test_what_is_wrong_is_said_in_a_line(city, tmp_path, program, capfd, monkeypatch):

@@ -1,4 +1,4 @@
-//! Frames of a walk that are rendered apart, by a session that stays open between them.
+//! Parts of a walk, frames or bands of them, by a session that stays open between them.
 
 use crate::errors::{exception, wrong};
 use crate::render::Watching;
@@ -27,7 +27,7 @@ impl State for Held {
 }
 
 impl Held {
-    /// Renders a frame, unless it is there already; what a person should know, too.
+    /// Renders a part, unless it is there already; what a person should know, too.
     fn part(&mut self, output: &Path, number: u32, task: &Arc<Task>) -> Result<(Option<parts::Made>, Vec<String>)> {
         if parts::is_whole(output, number, &self.key) {
             return Ok((None, Vec::new()));
@@ -43,11 +43,12 @@ impl Held {
     }
 }
 
-/// The frames of a walk. Threads may share it: their frames are rendered in turn.
+/// The parts of a walk. Threads may share it: their parts are rendered in turn.
 #[pyclass(frozen, module = "brickwalk._brickwalk")]
 pub struct WalkParts {
     key: String,
     frames: u32,
+    parts: u32,
     /// `None`: it is closed.
     worker: Mutex<Option<Worker<Held>>>,
 }
@@ -77,12 +78,12 @@ impl WalkParts {
         let scene = remote::name_with(&scene, disk);
         let (file, own) = (scene.clone(), settings.clone());
         let key = run_alone(py, &mut Progress::new(None, 0), move |_: &Arc<Task>| parts::key_of(&file, &own))?;
-        let frames = settings.frames;
+        let (frames, count) = (settings.frames, parts::count(&settings));
         let own = key.clone();
         // A session stays on the thread that opened it.
         let make = move || Held { scene, settings, key: own, session: None };
         let worker = Worker::start(make).map_err(|error| exception(&error))?;
-        Ok(Self { key, frames, worker: Mutex::new(Some(worker)) })
+        Ok(Self { key, frames, parts: count, worker: Mutex::new(Some(worker)) })
     }
 
     #[getter]
@@ -95,7 +96,12 @@ impl WalkParts {
         self.frames
     }
 
-    /// Renders frame `number` into the folder `output`, unless its part is there and whole.
+    #[getter]
+    fn parts(&self) -> u32 {
+        self.parts
+    }
+
+    /// Renders the part `number` into the folder `output`, unless it is there and whole.
     fn render<'py>(
         &self,
         py: Python<'py>,
@@ -103,15 +109,15 @@ impl WalkParts {
         number: u32,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        if number >= self.frames {
-            return Err(wrong(format!("frame {number}: the walk has {} frames, from 0", self.frames)));
+        if number >= self.parts {
+            return Err(wrong(format!("part {number}: the walk has {} parts, from 0", self.parts)));
         }
         let path = parts::file(&output, number);
         let work = move |held: &mut Held, task: &Arc<Task>| held.part(&output, number, task);
         let (made, warnings) = self.desk()?.run(py, &mut Progress::new(progress, 0), work)?;
         let dict = PyDict::new(py);
         dict.set_item("path", path)?;
-        dict.set_item("frame", number)?;
+        dict.set_item("part", number)?;
         dict.set_item("is_new", made.is_some())?;
         let made = made.unwrap_or_default();
         dict.set_item("worker", made.worker)?;

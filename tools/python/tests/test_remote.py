@@ -1,10 +1,13 @@
 """Scenes from a bucket, which a server on this machine plays: the same answers as from the file."""
 
+import http.server
 import os
 import pickle
 import shutil
+import ssl
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 
@@ -129,3 +132,54 @@ def test_what_is_wrong_is_named_without_secrets(bucket, monkeypatch):
     with pytest.raises(brickwalk.BrickwalkError, match="no connection") as error:
         brickwalk.Scene.open("http://ann:5ec2e7@127.0.0.1:9/a.bricks?sig=5ec2e7")
     assert "5ec2e7" not in str(error.value) and "127.0.0.1" in str(error.value)
+
+
+class Ranges(http.server.BaseHTTPRequestHandler):
+    """Answers requests for ranges of one file."""
+
+    protocol_version = "HTTP/1.1"
+    content = b""
+
+    def do_GET(self):
+        first, last = self.headers["Range"].removeprefix("bytes=").split("-")
+        part = self.content[int(first) : int(last) + 1]
+        self.send_response(206)
+        self.send_header("Content-Length", str(len(part)))
+        self.send_header("Content-Range", f"bytes {first}-{int(first) + len(part) - 1}/{len(self.content)}")
+        self.send_header("ETag", '"one"')
+        self.end_headers()
+        self.wfile.write(part)
+
+    def log_message(self, *_):
+        pass
+
+
+def test_https_trusts_known_certificates_alone(bucket, tmp_path):
+    """A server with a certificate of its own; processes of their own, as certificates are read once in a process."""
+    trustme = pytest.importorskip("trustme")
+    file, _ = bucket
+    authority = trustme.CA()
+    authority.cert_pem.write_to_path(tmp_path / "known.pem")
+    trustme.CA().cert_pem.write_to_path(tmp_path / "other.pem")
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), type("Own", (Ranges,), {"content": file.read_bytes()}))
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    authority.issue_cert("localhost").configure_cert(context)
+    server.socket = context.wrap_socket(server.socket, server_side=True)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    url = f"https://localhost:{server.server_port}/a.bricks"
+    words = f"import brickwalk; print(brickwalk.Scene.open({url!r}).info['triangles'])"
+
+    def triangles(certificates):
+        words_of = [sys.executable, "-c", words]
+        done = subprocess.run(
+            words_of, env={**os.environ, "SSL_CERT_FILE": str(certificates)}, capture_output=True, text=True
+        )
+        return done.returncode, done.stdout.strip(), done.stderr
+
+    try:
+        assert triangles(tmp_path / "known.pem")[:2] == (0, "4000")
+        status, _, said = triangles(tmp_path / "other.pem")
+        assert status == 1 and "BrickwalkError" in said and "panicked" not in said
+    finally:
+        server.shutdown()
+        server.server_close()

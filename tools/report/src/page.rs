@@ -366,16 +366,16 @@ fn workers(walk: &Walk) -> Option<Markup> {
     let rows = walk.summary("parts/workers")?.as_array().filter(|rows| !rows.is_empty())?;
     let number = |row: &Value, name: &str| row.get(name).and_then(Value::as_f64).unwrap_or_default();
     Some(html! {
-        p.reading { "Frames were rendered apart and joined in their order. Seconds are those of rendering." }
+        p.reading { "Frames, or bands of them, were rendered apart and joined in their order. Seconds are those of rendering." }
         div.wide { table {
-            thead { tr { th { "worker" } th { "frames" } th { "seconds" } th { "seconds a frame" } th { "loaded" } } }
+            thead { tr { th { "worker" } th { "parts" } th { "seconds" } th { "seconds a part" } th { "loaded" } } }
             tbody { @for row in rows {
-                @let [frames, seconds] = [number(row, "frames"), number(row, "seconds")];
+                @let [parts, seconds] = [number(row, "parts"), number(row, "seconds")];
                 tr {
                     th scope="row" { (row.get("worker").and_then(Value::as_str).unwrap_or_default()) }
-                    td { (format::count(frames)) }
+                    td { (format::count(parts)) }
                     td { (format::number(seconds)) }
-                    td { (format::number(seconds / frames.max(1.0))) }
+                    td { (format::number(seconds / parts.max(1.0))) }
                     td { (format::bytes(number(row, "bytes_loaded"))) }
                 }
             } }

@@ -307,6 +307,7 @@ fn render(
         light,
         size: (EXTENT.width, EXTENT.height),
         band_rows: variant.rows,
+        only_rows: None,
         tile: EXTENT.tile,
         fronts: variant.fronts.then(Fronts::default),
         budgeted: variant.budget.map(|_| Budgeted::new(scene.resident(), variant.hides == 0)),

@@ -64,10 +64,10 @@ class Core:
     ) -> tuple[dict[str, NDArray[Any]], list[str]]: ...
 
 class WalkParts:
-    """Frames of a walk that are rendered apart, for ``brickwalk walk --join``.
+    """Parts of a walk, for ``brickwalk walk --join``: its frames or, where settings ask for bands, bands of them.
 
     ``scene`` is a path or a URL, ``settings`` the text that ``brickwalk walk ... --print-settings`` prints. Any process
-    may render any frame, in any order. The session is opened by the first frame and stays open.
+    may render any part, in any order. The session is opened by the first part and stays open.
     """
 
     def __new__(cls, scene: str, settings: str, disk_cache: str | None = None) -> WalkParts: ...
@@ -77,10 +77,13 @@ class WalkParts:
     @property
     def frames(self) -> int:
         """Frames of the walk."""
+    @property
+    def parts(self) -> int:
+        """Its parts: of B bands part N is band N mod B of frame N / B, from the top."""
     def render(self, output: str, number: int, progress: Progress) -> dict[str, Any]:
-        """Renders frame ``number`` into the folder ``output``, unless its part is there and whole.
+        """Renders the part ``number`` into the folder ``output``, unless it is there and whole.
 
-        Returns ``path``, ``frame``, ``is_new``, ``worker``, ``seconds``, ``bytes_loaded``, of a scene by URL ``requests``,
+        Returns ``path``, ``part``, ``is_new``, ``worker``, ``seconds``, ``bytes_loaded``, of a scene by URL ``requests``,
         ``bytes_fetched`` and ``seconds_waiting``, and ``warnings``.
         """
     def close(self) -> None: ...
