@@ -32,7 +32,6 @@ mod command {
 /// the motion.
 mod exact {
     mod bands;
-    mod bucket;
     mod budget;
     mod cache_independence;
     mod clip;

@@ -17,7 +17,12 @@ if [ -z "${BRICKWALK:-}" ]; then
         cargo build --quiet --release --workspace --manifest-path "$root/Cargo.toml" --bin brickwalk
     BRICKWALK=$target/release/brickwalk
 fi
-export BRICKWALK PYTHONDONTWRITEBYTECODE=1
+BUCKET=${BUCKET:-$target/release/brickwalk-bucket}
+if [ ! -x "$BUCKET" ]; then
+    prepare
+    cargo build --quiet --release --workspace --manifest-path "$root/Cargo.toml" --bin brickwalk-bucket
+fi
+export BRICKWALK BUCKET PYTHONDONTWRITEBYTECODE=1
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check \
     'distributed>=2024.1' 'openjd-cli>=0.8' pytest 'setuptools>=69' wheel
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation \

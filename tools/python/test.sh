@@ -39,6 +39,10 @@ bytes=$(wc -c <"$wheel")
 echo "${wheel##*/}: $bytes bytes"
 
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$wheel"
+# The server of a bucket, for the tests of scenes by URL.
+cargo build --quiet --release --locked --workspace --manifest-path "$root/Cargo.toml" --target-dir "$target" \
+    --bin brickwalk-bucket
+export BUCKET=$target/release/brickwalk-bucket
 # Away from the sources, so that what is installed is what is tested.
 export PYTHONDONTWRITEBYTECODE=1
 cd "$target/python"

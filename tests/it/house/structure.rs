@@ -9,8 +9,15 @@ const MOST_FILES: usize = 25;
 /// Most columns of a comment.
 const MOST_COLUMNS: usize = 120;
 /// Crates, by the folders of their sources.
-const CRATES: [&str; 6] =
-    ["src", "bricks/src", "tools/convert/src", "tools/python/src", "tools/report/src", "tools/scenes/src"];
+const CRATES: [&str; 7] = [
+    "src",
+    "bricks/src",
+    "tools/bucket/src",
+    "tools/convert/src",
+    "tools/python/src",
+    "tools/report/src",
+    "tools/scenes/src",
+];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -158,7 +165,8 @@ fn files_that_comments_and_pages_name_are_there() {
             let is_code = ending == ".rs" || ending == ".wgsl";
             let lines = text.lines().filter_map(|line| if is_code { comment(line) } else { Some(line) });
             let is_missing = |name: &&str| {
-                let places = ["", "bricks", "tools/convert", "tools/python", "tools/report", "tools/scenes"];
+                let places =
+                    ["", "bricks", "tools/bucket", "tools/convert", "tools/python", "tools/report", "tools/scenes"];
                 !places.iter().any(|place| root().join(place).join(name).exists())
             };
             missing.extend(lines.flat_map(named_files).filter(is_missing).map(|name| format!("{file} names {name}")));

@@ -51,7 +51,10 @@ def parser() -> argparse.ArgumentParser:
 
     one = add("walk", "render frames along a camera path", "S.bricks -o DIR")
     one.add_argument(
-        "--chunk", type=_count, metavar="N", help="frames, or --bands of them, of a task [default: eight tasks a worker]"
+        "--chunk",
+        type=_count,
+        metavar="N",
+        help="frames, or --bands of them, of a task [default: eight tasks a worker]",
     )
     one.add_argument("--disk-cache", metavar="DIR,SIZE", help="keep parts of scenes from URLs in a folder")
     add("study", "measure error against run time, an effect a task", "S.bricks -o DIR")

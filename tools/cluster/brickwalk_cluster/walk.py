@@ -147,10 +147,10 @@ def walk(
 ) -> dict[str, Any]:
     """Renders the walk of ``words`` on the workers of ``cluster`` and joins it here.
 
-    A part is a frame or, with ``--bands``, a band of one. ``chunk`` is how many parts a task has; by default each worker
-    gets about eight tasks. ``log`` is a file that gets the number of each part that is rendered, a line each. Returns
-    what was done: frames, parts, those that were rendered, seconds of workers, bytes loaded; of a scene by URL
-    requests, bytes fetched and seconds of waiting for them.
+    A part is a frame or, with ``--bands``, a band of one. ``chunk`` is how many parts a task has; by default each
+    worker gets about eight tasks. ``log`` is a file that gets the number of each part that is rendered, a line each.
+    Returns what was done: frames, parts, those that were rendered, seconds of workers, bytes loaded; of a scene by
+    URL requests, bytes fetched and seconds of waiting for them.
 
     Raises :class:`Failed`.
     """

@@ -3,6 +3,7 @@
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -166,6 +167,31 @@ def test_bands_of_one_picture_are_rendered_by_several_workers(city, run, tmp_pat
     assert Counter(log.read_text().split()) == Counter(map(str, range(8)))
     rows = json.loads((tmp_path / "out" / "summary.json").read_text())["parts"]["workers"]
     assert sum(row["parts"] for row in rows) == 8 and len(rows) == 2
+
+
+def test_a_walk_from_a_bucket_is_that_of_the_file(city, whole, run, tmp_path, monkeypatch):
+    """By one process, and by workers of a cluster, which fetch for themselves."""
+    if "BUCKET" not in os.environ:
+        pytest.skip("BUCKET names no server; tools/cluster/test.sh builds one")
+    folder = tmp_path / "buckets" / "plant" / "scenes"
+    folder.mkdir(parents=True)
+    shutil.copy(city, folder / "a b.bricks")
+    keys = {"AWS_ACCESS_KEY_ID": "nobody", "AWS_SECRET_ACCESS_KEY": "5ec2e7", "AWS_REGION": "us-east-1"}
+    for name, value in {**keys, "AWS_ALLOW_HTTP": "true"}.items():
+        monkeypatch.setenv(name, value)
+    line = [os.environ["BUCKET"], str(tmp_path / "buckets")]
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
+        monkeypatch.setenv("AWS_ENDPOINT", f"http://127.0.0.1:{int(server.stdout.readline())}")
+        scene = "s3://plant/scenes/a%20b.bricks"
+        run("walk", scene, "-o", tmp_path / "one", *VIEW)
+        with Cluster(workers=2) as cluster:
+            done = walk(cluster, [scene, "-o", str(tmp_path / "two"), *VIEW], is_quiet=True)
+        server.stdin.close()
+    run("walk", city, "-o", tmp_path / "file", *VIEW)
+    assert frames(tmp_path / "one") == frames(tmp_path / "two") == frames(tmp_path / "file")
+    remote = json.loads((tmp_path / "one" / "summary.json").read_text())["remote"]
+    assert remote["bytes_fetched"] <= 1.05 * remote["bytes_needed"] and remote["retries"] == 0
+    assert done["requests"] > 2 and done["bytes_fetched"] > 0
 
 
 def test_what_is_wrong_is_said_in_a_line(city, tmp_path, program, capfd, monkeypatch):

@@ -1,4 +1,4 @@
-"""Scenes from a bucket, which a server on this machine plays: the same answers as from the file."""
+"""Scenes from a bucket, which two servers on this machine play: the same answers as from the file."""
 
 import http.server
 import os
@@ -24,8 +24,9 @@ KEYS = {
     "AWS_ALLOW_HTTP": "true",
 }
 
-# Serves until its input ends, and says at which port.
-SERVER = """
+# Servers serve until their input ends, and say at which port. This one has the protocol; that of tools/bucket, which
+# the environment variable BUCKET names, checks signatures as well.
+MOTO = """
 import sys
 from moto.server import ThreadedMotoServer
 server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
@@ -44,23 +45,36 @@ def put(url, body=b""):
         assert answer.status == 200
 
 
-@pytest.fixture(scope="module")
-def bucket(tmp_path_factory):
+@pytest.fixture(scope="module", params=["moto", "s3s"])
+def bucket(request, tmp_path_factory):
     """A scene file, and its URL."""
-    pytest.importorskip("moto.server")
+    root = tmp_path_factory.mktemp("buckets")
+    if request.param == "moto":
+        pytest.importorskip("moto.server")
+        server = [sys.executable, "-c", MOTO]
+    else:
+        if "BUCKET" not in os.environ:
+            pytest.skip("BUCKET names no server; tools/python/test.sh builds one")
+        server = [os.environ["BUCKET"], str(root)]
+        (root / "bucket").mkdir()
     file = tmp_path_factory.mktemp("scene") / "a.bricks"
     vertices, faces = meshes.soup(4000)
     with brickwalk.Scene.from_arrays(vertices, faces, brick_triangles=64) as scene:
         shutil.copy(scene.info["path"], file)
-    with subprocess.Popen([sys.executable, "-c", SERVER], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as server:
+    own = {**os.environ, **KEYS}
+    with subprocess.Popen(server, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=own) as server:
         try:
             endpoint = f"http://127.0.0.1:{int(server.stdout.readline())}"
-            put(f"{endpoint}/bucket")
-            put(f"{endpoint}/bucket/scenes/a.bricks", file.read_bytes())
+            if request.param == "moto":
+                put(f"{endpoint}/bucket")
+                put(f"{endpoint}/bucket/scenes/a.bricks", file.read_bytes())
+            else:
+                (root / "bucket" / "scenes").mkdir()
+                shutil.copy(file, root / "bucket" / "scenes" / "a.bricks")
             with pytest.MonkeyPatch.context() as patch:
                 for name, value in {**KEYS, "AWS_ENDPOINT": endpoint}.items():
                     patch.setenv(name, value)
-                yield file, "s3://bucket/scenes/a.bricks"
+                yield file, "s3://bucket/scenes/a.bricks", request.param
         finally:
             server.stdin.close()
             server.wait(timeout=30)
@@ -72,7 +86,7 @@ def rays():
 
 
 def test_answers_are_those_of_the_file(bucket):
-    file, url = bucket
+    file, url, _ = bucket
     with brickwalk.Scene.open(file, adapter="cpu") as local, brickwalk.Scene.open(url, adapter="cpu") as remote:
         assert remote.stats()["remote"]["requests"] == 2
         assert "remote" not in local.stats()
@@ -93,7 +107,7 @@ def test_answers_are_those_of_the_file(bucket):
 
 
 def test_a_disk_cache_saves_all_but_the_head(bucket, tmp_path):
-    file, url = bucket
+    file, url, _ = bucket
     cache = f"{tmp_path},64M"
     with brickwalk.Scene.open(url, disk_cache=cache) as first:
         expected = first.cast_rays(rays())
@@ -107,7 +121,7 @@ def test_a_disk_cache_saves_all_but_the_head(bucket, tmp_path):
 
 
 def test_a_forked_process_fetches_for_itself(bucket):
-    _, url = bucket
+    _, url, _ = bucket
     if not hasattr(os, "fork"):
         pytest.skip("this system has no fork")
     with brickwalk.Scene.open(url) as scene:
@@ -126,12 +140,17 @@ def test_a_forked_process_fetches_for_itself(bucket):
 
 
 def test_what_is_wrong_is_named_without_secrets(bucket, monkeypatch):
-    _, url = bucket
+    _, url, server = bucket
     with pytest.raises(brickwalk.BrickwalkError, match="there is no such object"):
         brickwalk.Scene.open(url + ".missing")
     with pytest.raises(brickwalk.BrickwalkError, match="no connection") as error:
         brickwalk.Scene.open("http://ann:5ec2e7@127.0.0.1:9/a.bricks?sig=5ec2e7")
     assert "5ec2e7" not in str(error.value) and "127.0.0.1" in str(error.value)
+    if server == "s3s":
+        monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "another")
+        with pytest.raises(brickwalk.BrickwalkError, match="access was denied") as error:
+            brickwalk.Scene.open(url)
+        assert "another" not in str(error.value)
 
 
 class Ranges(http.server.BaseHTTPRequestHandler):
@@ -157,7 +176,7 @@ class Ranges(http.server.BaseHTTPRequestHandler):
 def test_https_trusts_known_certificates_alone(bucket, tmp_path):
     """A server with a certificate of its own; processes of their own, as certificates are read once in a process."""
     trustme = pytest.importorskip("trustme")
-    file, _ = bucket
+    file, _, _ = bucket
     authority = trustme.CA()
     authority.cert_pem.write_to_path(tmp_path / "known.pem")
     trustme.CA().cert_pem.write_to_path(tmp_path / "other.pem")
