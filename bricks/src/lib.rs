@@ -33,6 +33,7 @@ pub mod pack;
 pub mod pattern;
 mod payload;
 mod place;
+pub mod planted;
 mod reader;
 pub mod records;
 mod resident;

@@ -5,6 +5,7 @@ use crate::error::{Error, Flaw, Part};
 use crate::file::SceneFile;
 use crate::layout::{DirectoryEntry, Header, MAGIC, MAX_PAYLOAD_BYTES, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
 use crate::payload::Payload;
+use crate::planted::{self, Defect};
 use crate::records::Span;
 use crate::resident::Resident;
 use crate::source::{ByteSource, ReadSource};
@@ -53,6 +54,9 @@ impl Writer {
     /// folder must exist. A file that an earlier process left there is kept until [`Partial::start`].
     pub fn reserve(path: impl AsRef<Path>) -> Result<Partial, Error> {
         let (path, target, name) = names(path.as_ref())?;
+        if planted::is(Defect::OldOutput) {
+            File::create(&target).map_err(|source| create_error(&path, source))?;
+        }
         let partial = folder_of(&target).join(format!("{name}.partial"));
         loop {
             let options = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&partial);
@@ -76,7 +80,9 @@ impl Writer {
     /// Hands everything written to the operating system, so that it outlives this process, and returns how many bytes
     /// that is: what [`Partial::resume`] takes.
     pub fn checkpoint(&mut self) -> Result<u64, Error> {
-        self.file.flush().map_err(|source| self.write_error(source))?;
+        if !planted::is(Defect::EarlyRecord) {
+            self.file.flush().map_err(|source| self.write_error(source))?;
+        }
         Ok(self.position)
     }
 

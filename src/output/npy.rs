@@ -2,6 +2,7 @@
 
 use super::atomic;
 use anyhow::{Context, Result, bail, ensure};
+use bricks::planted::{self, Defect};
 use bytemuck::{Pod, Zeroable};
 use npyz::{DType, Field, NpyFile, Order, TypeStr, WriteOptions, WriterBuilder};
 use std::fs::File;
@@ -125,7 +126,7 @@ fn read_rows<T>(path: &Path, what: &str, widths: &[u64], row: impl Fn(&[f64]) ->
     let row_bytes = columns * number_bytes;
     let data = rows.and_then(|rows| rows.checked_mul(row_bytes));
     ensure!(
-        data.and_then(|bytes| bytes.checked_add(header_bytes)) == Some(length),
+        data.and_then(|bytes| bytes.checked_add(header_bytes)) == Some(length) || planted::is(Defect::NpyRows),
         "{name}: found {length} bytes, but the header promises {what} of {row_bytes} bytes in shape {shape:?}; write \
          it again"
     );

@@ -196,6 +196,11 @@ impl Motion {
         Ok(Self { file: file.into(), movers: movers.collect::<Result<_, _>>()? })
     }
 
+    /// What moves, as the file has it.
+    pub fn movers(&self) -> &[Mover] {
+        &self.movers
+    }
+
     /// The instances of a scene that it moves.
     ///
     /// # Errors

@@ -25,6 +25,7 @@ pub use payload::payload;
 use crate::error::{Flaw, Part};
 use crate::layout::{PAGE_BYTES, Section};
 use crate::payload::Payload;
+use crate::planted::{self, Defect};
 use crate::records::Span;
 use crate::resident::Resident;
 use rule::rule;
@@ -73,7 +74,8 @@ pub fn spans(resident: &Resident, payload_end: u64) -> Result<(), Flaw> {
             let expected = expected.unwrap_or(u64::MAX);
             (format!("byte {} as its start", span.offset), format!("byte {expected}, next after what is before it"))
         })?;
-        end = span.offset.checked_add(span.bytes).filter(|&end| end <= payload_end);
+        let fits = |end: &u64| *end <= payload_end || planted::is(Defect::PayloadEnd);
+        end = span.offset.checked_add(span.bytes).filter(fits);
         rule(end.is_some(), Part::Payload(payload), || {
             let found = format!("{} bytes from byte {}", span.bytes, span.offset);
             (found, format!("an end before the directory at byte {payload_end}"))

@@ -8,6 +8,7 @@ use super::rule::rule;
 use super::{displacement, occupancy};
 use crate::error::{Flaw, Part};
 use crate::payload::Payload;
+use crate::planted::{self, Defect};
 use crate::records::{
     AttributeDetail, AttributeLayout, AttributeVertex, BRICK_INDEX32, BRICK_OPACITY, BRICK_WIDE, Brick, GeometryLayout,
 };
@@ -78,7 +79,8 @@ fn geometry(part: Part, brick: &Brick, (object, triangle_ids): (&Object, u32), b
     })?;
     padding(part, bytes, ids_end, layout.indices)?;
     let up_to_indices = &bytes[..layout.opacity_of as usize];
-    indices(part, brick, brick.vertex_count, up_to_indices, layout.indices)
+    let vertices = if planted::is(Defect::BrickVertex) { u32::MAX } else { brick.vertex_count };
+    indices(part, brick, vertices, up_to_indices, layout.indices)
 }
 
 /// Checks what decides which rays pass through triangles.

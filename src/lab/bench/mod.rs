@@ -18,4 +18,4 @@ pub(super) mod results;
 pub mod roma;
 pub(super) mod runner;
 pub(super) mod scenes;
-pub(super) mod store;
+pub mod store;

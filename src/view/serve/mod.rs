@@ -11,7 +11,7 @@
 
 mod encode;
 mod guest;
-mod told;
+pub mod told;
 
 use super::studio::{Converter, Pace};
 use crate::session::Settings;

@@ -8,6 +8,7 @@ use crate::import::table::{Table, TableWriter};
 use crate::import::text::{Lines, number};
 use crate::import::warnings::Warnings;
 use bricks::NONE;
+use bricks::planted::{self, Defect};
 use std::collections::HashMap;
 use std::io::BufReader;
 use std::path::Path;
@@ -237,7 +238,7 @@ impl Parser<'_> {
 
     fn finish(self) -> Result<Parsed, ImportError> {
         let count = self.positions.count();
-        if self.ahead.index > count {
+        if self.ahead.index > count && !planted::is(Defect::ObjVertex) {
             let what = format!("refers to vertex {}, but the file has {count}", self.ahead.index);
             return Err(fault(self.path, format!("line {}", self.ahead.line), what));
         }

@@ -18,6 +18,7 @@ use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
 use super::opened::{self, TriangleBudget};
 use super::{gltf, uri};
 use crate::source::IDENTITY;
+use bricks::planted::{self, Defect};
 use document::{Tile, Tileset};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -178,10 +179,10 @@ impl Walk<'_> {
     /// What the tileset of `place` shows.
     fn external(&mut self, place: &Place) -> Result<Vec<Shown>, ImportError> {
         let fault = |what: &str| fault(&place.parsed.label, "tileset".into(), what.to_owned());
-        if self.open.contains(&place.below) {
+        if self.open.contains(&place.below) && !planted::is(Defect::TilesetCircle) {
             return Err(fault("refers to itself, directly or through others"));
         }
-        if self.open.len() == MAX_DEPTH {
+        if self.open.len() == MAX_DEPTH && !planted::is(Defect::TilesetCircle) {
             return Err(fault("external tilesets are nested too deeply"));
         }
         self.open.push(place.below.clone());

@@ -1,0 +1,49 @@
+//! All kinds: a line each.
+
+use crate::inputs;
+use crate::kills::all as kills;
+use crate::kind::Kind;
+
+/// All kinds, those that are fast first.
+pub static ALL: [&(dyn Kind + 'static); 35] = [
+    &inputs::gltf::Glb,
+    &inputs::gltf::Gltf,
+    &inputs::compressed::Compressed,
+    &inputs::samples::Samples,
+    &inputs::tiles::Tiles,
+    &inputs::obj::Obj,
+    &inputs::ply::Ply,
+    &inputs::stl::Stl,
+    &inputs::pictures::Pictures,
+    &inputs::environment::Environment,
+    &inputs::npy::Npy,
+    &inputs::keyframes::Paths,
+    &inputs::keyframes::Motions,
+    &inputs::settings::SettingsFiles,
+    &inputs::words::Words,
+    &inputs::messages::Messages,
+    &inputs::requests::Requests,
+    &inputs::bricks_file::BricksFile,
+    &inputs::field::Field,
+    &inputs::arrays::Arrays,
+    &inputs::rates::RateFiles,
+    &inputs::rows::RowFiles,
+    &kills::SCENE,
+    &kills::SCENE_MEMORY,
+    &kills::CONVERT,
+    &kills::CONVERT_MEMORY,
+    &kills::LEVELS,
+    &kills::DISPLACEMENT,
+    &kills::REPAIR,
+    &kills::WALK,
+    &kills::DVF,
+    &kills::STUDY,
+    &kills::QUERY,
+    &kills::TRACE,
+    &kills::PARTS,
+];
+
+/// The kind of this name.
+pub fn find(name: &str) -> Option<&'static dyn Kind> {
+    ALL.into_iter().find(|kind| kind.name() == name)
+}
