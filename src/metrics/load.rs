@@ -11,6 +11,9 @@ use std::path::{Path, PathBuf};
 /// Most pixels of an EXR file that is read: 16384², against files whose header asks for more memory than there is.
 const MAX_PIXELS: u64 = 1 << 28;
 
+/// Most pixels of a byte of a PNG file: deflate reaches 1032:1, and a grey pixel takes a bit.
+const MAX_PIXELS_A_BYTE: u64 = 8 * 1032;
+
 /// How a file encodes its colours, which decides which FLIP applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
@@ -76,7 +79,7 @@ pub enum LoadError {
         /// What is wrong.
         source: exr::error::Error,
     },
-    /// The EXR file is sound but not of a kind that can be compared.
+    /// The file is not of a kind that can be compared.
     #[error("{}: {found}; {expected}", path.display())]
     Unsupported {
         /// The file.
@@ -104,9 +107,22 @@ pub fn load(path: impl AsRef<Path>) -> Result<Loaded, LoadError> {
 }
 
 fn load_png(path: &Path) -> Result<Loaded, LoadError> {
-    let file = File::open(path).map_err(|source| LoadError::Io { path: path.to_owned(), source })?;
+    let io = |source| LoadError::Io { path: path.to_owned(), source };
+    let png = |source| LoadError::Png { path: path.to_owned(), source };
+    let file = File::open(path).map_err(io)?;
+    let bytes = file.metadata().map_err(io)?.len();
+    let reader = image::ImageReader::with_format(BufReader::new(&file), image::ImageFormat::Png);
+    let (width, height) = reader.into_dimensions().map_err(png)?;
+    let pixels = u64::from(width) * u64::from(height);
+    // Before memory is taken for them.
+    if pixels > bytes.saturating_mul(MAX_PIXELS_A_BYTE) || pixels > MAX_PIXELS {
+        let found = format!("{width}x{height} pixels in {bytes} bytes");
+        let expected = "images of up to 2^28 pixels are compared, and a file has bytes for its own";
+        return Err(LoadError::Unsupported { path: path.to_owned(), found, expected });
+    }
+    let file = File::open(path).map_err(io)?;
     let reader = image::ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
-    let picture = reader.decode().map_err(|source| LoadError::Png { path: path.to_owned(), source })?;
+    let picture = reader.decode().map_err(png)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let table = |codes: usize| -> Vec<f32> {
         (0..codes).map(|code| linear_from_srgb(code as f64 / (codes - 1) as f64) as f32).collect()
@@ -238,6 +254,12 @@ mod tests {
         assert!(p[0] > p[1] && p[0] < p[1] + 1e-4, "the low byte counts");
     }
 
+    /// The checksum of the first chunk of a PNG file, a bit at a time.
+    fn crc_of_ihdr(file: &[u8]) -> u32 {
+        let step = |crc: u32, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 };
+        !file[12..29].iter().fold(u32::MAX, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), step))
+    }
+
     #[test]
     fn bad_files_are_errors_that_name_them() {
         let directory = tempfile::tempdir().unwrap();
@@ -252,6 +274,17 @@ mod tests {
         check("short.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR");
         check("short.exr", &[0x76, 0x2f, 0x31, 0x01, 2, 0, 0, 0]);
         assert!(matches!(load(directory.path().join("absent.png")), Err(LoadError::Io { .. })));
+
+        // A header that promises more than the file can hold.
+        let mut huge = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x3e\x80\0\0\x1f\x40\x08\x02\0\0\0".to_vec();
+        huge.extend([0x2d, 0x76, 0x34, 0x1a, 0, 0, 0, 0]);
+        let path = directory.path().join("huge.png");
+        let checksum = crc_of_ihdr(&huge);
+        huge.splice(29..33, checksum.to_be_bytes());
+        huge.extend(b"IDAT\x35\xaf\x06\x1e");
+        std::fs::write(&path, huge).unwrap();
+        let text = load(&path).unwrap_err().to_string();
+        assert!(text.contains("16000x8000 pixels in "), "{text}");
 
         // A sound file cut anywhere is an error too.
         let path = directory.path().join("c.exr");

@@ -191,6 +191,9 @@ impl Motion {
             if poses.is_empty() {
                 return Err(refuse("it has no keyframes; add at least one".into()));
             }
+            if !(poses[poses.len() - 1].time - poses[0].time).is_finite() {
+                return Err(refuse("its times are too far apart for a number".into()));
+            }
             Ok(Mover { target, pivot, keyframes: poses })
         });
         Ok(Self { file: file.into(), movers: movers.collect::<Result<_, _>>()? })

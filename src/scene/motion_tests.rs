@@ -27,6 +27,7 @@ fn errors_name_the_file_the_thing_and_the_remedy() {
         (keyed(r#"{"time": 0, "scale": 0}"#), vec!["keyframe 0", "scale 0"]),
         (keyed(r#"{"time": 0, "translate": [0,0,0]}"#), vec!["keyframe 0", "translate"]),
         (keyed(r#"{"time": 1}, {"time": 1}"#), vec!["keyframe 1", "sort"]),
+        (keyed(r#"{"time": -1e308}, {"time": 1e308}"#), vec!["node \"a\"", "too far apart"]),
     ] {
         let error = parse(&text).unwrap_err().to_string();
         assert!(error.starts_with("m.json: ") && !error.contains('\n'), "{error}");
@@ -82,4 +83,16 @@ fn no_motion_leaves_matrices_as_they_are_and_turns_are_about_the_pivot() {
     };
     assert!((image(pivot) - pivot - DVec3::X).length() < 1e-12);
     assert!((image(pivot + DVec3::X) - pivot - DVec3::X - DVec3::new(-2.0, 0.0, 0.0)).length() < 1e-12);
+}
+
+#[test]
+fn poses_beyond_the_range_of_numbers_lie_on_lines() {
+    let keys = r#"{"time": -1e308, "translation": [2, 8, -3]}, {"time": 1, "translation": [2, -1, 2.5]},
+        {"time": 2, "translation": [7, 1e308, 0]}, {"time": 3, "translation": [7, -1e308, 0]}"#;
+    let mover = mover(keys);
+    for time in [-1e308, -5e307, -0.5, 0.0, 1.0, 1.5, 2.0, 2.5, 3.0] {
+        let pose = mover.at(time);
+        assert!(pose.translation.is_finite(), "{time}: {pose:?}");
+    }
+    assert_eq!(mover.at(1.0).translation, DVec3::new(2.0, -1.0, 2.5));
 }

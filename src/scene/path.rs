@@ -192,7 +192,8 @@ impl CameraPath {
     }
 }
 
-/// `value` of the keyframes at `time` within segment `[i, i + 1]`, on the spline of this module.
+/// `value` of the keyframes at `time` within segment `[i, i + 1]`, on the spline of this module; on a line where that
+/// leaves the range of numbers. It is finite if values and the range of times are.
 pub(super) fn spline<K>(
     keys: &[K],
     i: usize,
@@ -218,10 +219,12 @@ pub(super) fn spline<K>(
     };
     let (m_a, m_b) = (tangent(i) * span, tangent(i + 1) * span);
     let (s2, s3) = (s * s, s * s * s);
-    value(a) * (2.0 * s3 - 3.0 * s2 + 1.0)
+    let curve = value(a) * (2.0 * s3 - 3.0 * s2 + 1.0)
         + m_a * (s3 - 2.0 * s2 + s)
         + value(b) * (3.0 * s2 - 2.0 * s3)
-        + m_b * (s3 - s2)
+        + m_b * (s3 - s2);
+    // Velocities and distances of finite keyframes may be beyond all numbers; the way between two of them is not.
+    if curve.is_finite() { curve } else { value(a) * (1.0 - s) + value(b) * s }
 }
 
 #[cfg(test)]

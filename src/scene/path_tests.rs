@@ -140,3 +140,18 @@ fn shipped_paths_are_inside_sponza() {
     }
     assert!(seen >= 6, "{seen} paths in {folder:?}");
 }
+
+#[test]
+fn ways_beyond_the_range_of_numbers_are_lines() {
+    let at = |k: usize, x: f64| key([0.0, 1.0, 2.0, 1e308][k], [x, k as f64, 0.0], [x, 20.0, 0.0]);
+    for far in [3.0, -1e308] {
+        let p = path(vec![at(0, 5.0), at(1, -8.0), at(2, 7.0), at(3, far)]);
+        for k in p.keyframes() {
+            assert_eq!(p.at(k.time).position.to_array(), k.position);
+        }
+        for time in [0.5, 1.5, 2.5, 1e10, 5e307, 9e307] {
+            let camera = p.at(time);
+            assert!(camera.position.is_finite() && camera.target.is_finite(), "{time}: {camera:?}");
+        }
+    }
+}

@@ -107,9 +107,12 @@ fn run(words: &Words) -> Result<ExitCode> {
     }
     if words.list {
         for kind in kinds::ALL {
-            println!("{:24} {}{}", kind.name(), kind.about(), kind.lacks().map_or_else(String::new, |why| {
-                format!(" (not here: {why})")
-            }));
+            println!(
+                "{:24} {}{}",
+                kind.name(),
+                kind.about(),
+                kind.lacks().map_or_else(String::new, |why| { format!(" (not here: {why})") })
+            );
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -139,7 +142,13 @@ fn run(words: &Words) -> Result<ExitCode> {
 }
 
 fn tell(finding: &Finding) {
-    println!("{}: {}\n    {}\n    {}", finding.kind, finding.what, finding.text.replace('\n', "\n    "), finding.command);
+    println!(
+        "{}: {}\n    {}\n    {}",
+        finding.kind,
+        finding.what,
+        finding.text.replace('\n', "\n    "),
+        finding.command
+    );
 }
 
 /// The kinds whose names begin as one of `only`, and that can run here; all without any.

@@ -96,8 +96,7 @@ fn all(kind: &dyn Kind, work: &Work, board: &Board) -> Result<()> {
         std::fs::create_dir_all(&own)?;
         board.set(Slot::Seed, seed);
         board.set(Slot::Busy, 1);
-        let trial =
-            Trial { seed, folder: &own, shared: &shared, program: &work.program, keep: work.keep.as_deref() };
+        let trial = Trial { seed, folder: &own, shared: &shared, program: &work.program, keep: work.keep.as_deref() };
         let ended = one(kind, &trial, board);
         empty(&own)?;
         match ended {

@@ -4,8 +4,8 @@ use super::{Files, Format, Verdict, refused};
 use crate::kind::Fault;
 use crate::mutate::Harm;
 use crate::random::Random;
-use brickwalk::output::arrays::Read;
 use bricks::pack::pack;
+use brickwalk::output::arrays::Read;
 use serde_json::{Value, json};
 use std::path::Path;
 use xxhash_rust::xxh3::xxh3_64;
@@ -25,7 +25,8 @@ impl Format for Arrays {
         let mut rows = Vec::new();
         for (name, width) in [("radiance", 12), ("depth", 4), ("state", 1)] {
             let count = random.below(200);
-            let bytes: Vec<u8> = (0..count * width).map(|at| if at % 4 > 1 { 63 } else { random.word() as u8 }).collect();
+            let bytes: Vec<u8> =
+                (0..count * width).map(|at| if at % 4 > 1 { 63 } else { random.word() as u8 }).collect();
             let mut block = if bytes.is_empty() { Vec::new() } else { pack(&bytes) };
             harm.bytes(random, &mut block, 20);
             let packed: Vec<usize> = if bytes.is_empty() { Vec::new() } else { vec![block.len()] };
@@ -51,10 +52,17 @@ impl Format for Arrays {
         let count = |width: u64| {
             let text = String::from_utf8_lossy(files.bytes()).into_owned();
             let start = text.find('{').unwrap_or(0);
-            let mut values = serde_json::Deserializer::from_str(text.get(start..).unwrap_or_default()).into_iter::<Value>();
+            let mut values =
+                serde_json::Deserializer::from_str(text.get(start..).unwrap_or_default()).into_iter::<Value>();
             let head = values.next().and_then(Result::ok).unwrap_or_default();
             let row = head["arrays"].as_array().and_then(|rows| {
-                let name = if width == 12 { "radiance" } else if width == 4 { "depth" } else { "state" };
+                let name = if width == 12 {
+                    "radiance"
+                } else if width == 4 {
+                    "depth"
+                } else {
+                    "state"
+                };
                 rows.iter().find(|row| row["name"] == name).cloned()
             });
             row.and_then(|row| row["bytes"].as_u64()).unwrap_or(0) / width

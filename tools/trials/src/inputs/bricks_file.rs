@@ -4,10 +4,10 @@ use super::{Files, Format, Verdict};
 use crate::kind::Fault;
 use crate::mutate::{Harm, bytes};
 use crate::random::Random;
+use bricks::layout::Header;
 use brickwalk_convert::build::{BuildSettings, TextureEncoding, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Primitive, SourceTexture};
-use bricks::layout::Header;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -71,11 +71,16 @@ fn resident(file: &[u8]) -> usize {
 
 impl Format for BricksFile {
     const NAME: &'static str = "inputs/bricks";
-    const ABOUT: &'static str = "Scene files of all sections, with checksums made right: opened, copied, followed, verified";
+    const ABOUT: &'static str =
+        "Scene files of all sections, with checksums made right: opened, copied, followed, verified";
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
         let is_golden = random.chance(15) || small().is_empty();
-        let file = if is_golden { random.pick(GOLDEN).to_vec() } else { random.pick_from(small()).cloned().unwrap_or_default() };
+        let file = if is_golden {
+            random.pick(GOLDEN).to_vec()
+        } else {
+            random.pick_from(small()).cloned().unwrap_or_default()
+        };
         let mut file = file;
         if harm.does(random, 100) {
             for _ in 0..random.pick([1, 1, 1, 2, 3]) {

@@ -10,8 +10,19 @@ use std::path::Path;
 
 /// Words of HDR headers.
 const NAMES: &[&str] = &[
-    "#?RADIANCE", "#?RGBE", "FORMAT=32-bit_rle_rgbe", "FORMAT=32-bit_rle_xyze", "EXPOSURE=2", "GAMMA=1", "-Y", "+Y",
-    "+X", "-X", "8000", "16000", "65536",
+    "#?RADIANCE",
+    "#?RGBE",
+    "FORMAT=32-bit_rle_rgbe",
+    "FORMAT=32-bit_rle_xyze",
+    "EXPOSURE=2",
+    "GAMMA=1",
+    "-Y",
+    "+Y",
+    "+X",
+    "-X",
+    "8000",
+    "16000",
+    "65536",
 ];
 
 /// Environments.

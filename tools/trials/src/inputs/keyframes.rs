@@ -11,8 +11,19 @@ use std::path::Path;
 
 /// Keys of both.
 const NAMES: &[&str] = &[
-    "fov_y_degrees", "up", "keyframes", "time", "position", "target", "instances", "node", "instance", "pivot",
-    "translation", "rotation", "scale",
+    "fov_y_degrees",
+    "up",
+    "keyframes",
+    "time",
+    "position",
+    "target",
+    "instances",
+    "node",
+    "instance",
+    "pivot",
+    "translation",
+    "rotation",
+    "scale",
 ];
 
 /// The text of a file, or what refuses it.
@@ -81,9 +92,7 @@ impl Format for Motions {
     const ABOUT: &'static str = "Motions: what is read has a pose at every time";
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
-        let keyframe = |at: usize, random: &mut Random| {
-            json!({"time": at, "translation": numbers::<3>(random), "rotation": [0, 0.6, 0, 0.8], "scale": 1 + at})
-        };
+        let keyframe = |at: usize, random: &mut Random| json!({"time": at, "translation": numbers::<3>(random), "rotation": [0, 0.6, 0, 0.8], "scale": 1 + at});
         let mover = |random: &mut Random| {
             let keyframes: Vec<Value> = (0..random.within(1, 5)).map(|at| keyframe(at, random)).collect();
             match random.chance(50) {

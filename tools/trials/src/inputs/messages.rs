@@ -11,10 +11,55 @@ use std::path::Path;
 
 /// Keys and texts of messages.
 const NAMES: &[&str] = &[
-    "do", "taken", "size", "thrust", "look", "orbit", "dolly", "click", "measure", "home", "find", "node", "overlay",
-    "set", "key", "value", "width", "height", "at", "right", "up", "steps", "double", "text", "act", "go", "hide",
-    "number", "effects", "ao_rays", "diffuse_rays", "sun", "environment", "spp", "lod", "exposure", "tone_map",
-    "denoise", "primary,diffuse", "auto", "sky", "off", "/etc/passwd", "1e9", "-1", "aces", "0.5", "1,2,3", "cache",
+    "do",
+    "taken",
+    "size",
+    "thrust",
+    "look",
+    "orbit",
+    "dolly",
+    "click",
+    "measure",
+    "home",
+    "find",
+    "node",
+    "overlay",
+    "set",
+    "key",
+    "value",
+    "width",
+    "height",
+    "at",
+    "right",
+    "up",
+    "steps",
+    "double",
+    "text",
+    "act",
+    "go",
+    "hide",
+    "number",
+    "effects",
+    "ao_rays",
+    "diffuse_rays",
+    "sun",
+    "environment",
+    "spp",
+    "lod",
+    "exposure",
+    "tone_map",
+    "denoise",
+    "primary,diffuse",
+    "auto",
+    "sky",
+    "off",
+    "/etc/passwd",
+    "1e9",
+    "-1",
+    "aces",
+    "0.5",
+    "1,2,3",
+    "cache",
 ];
 
 /// Messages.
@@ -23,6 +68,7 @@ pub struct Messages;
 impl Format for Messages {
     const NAME: &'static str = "inputs/messages";
     const ABOUT: &'static str = "Messages of a page to the server: no setting changes but those that a page may set";
+    const IS_LINE: bool = false;
     const NAMES_FILE: bool = false;
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
@@ -53,7 +99,9 @@ impl Format for Messages {
             return Err(Fault::new("a page changes what it may not", format!("{key} = {value}")));
         }
         match done {
-            Ok(()) if settings.check().is_err() => Err(Fault::new("a page sets what is wrong", format!("{key} = {value}"))),
+            Ok(()) if settings.check().is_err() => {
+                Err(Fault::new("a page sets what is wrong", format!("{key} = {value}")))
+            }
             Ok(()) => Ok(Verdict::Read),
             Err(_) if settings != before => Err(Fault::new("a refusal changes settings", format!("{key} = {value}"))),
             // A value of a sound message may be none of its setting.

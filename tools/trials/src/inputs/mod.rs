@@ -28,8 +28,8 @@ use crate::mutate::Harm;
 use crate::random::Random;
 use std::path::{Path, PathBuf};
 
-/// Most characters of the line that refuses an input.
-const MOST_LINE: usize = 2000;
+/// Most characters of the line that refuses an input: it may name two paths, each as long as paths can be.
+const MOST_LINE: usize = 10_000;
 
 /// Files of an input: names, with folders, and bytes. The first is the one that is read.
 #[derive(Clone, Debug, Default)]
@@ -90,6 +90,8 @@ pub trait Format: Send + Sync {
     const MOST_BYTES: u64 = 64 << 20;
     /// Whether a refusal names the file.
     const NAMES_FILE: bool = true;
+    /// Whether a refusal is one line by itself; else who prints it makes it one.
+    const IS_LINE: bool = true;
     /// Whether what is not harmed has to be read.
     const IS_SOUND: bool = true;
 
@@ -139,10 +141,13 @@ impl<F: Format> Kind for F {
         if harm.is_off() && F::IS_SOUND {
             return Err(Fault::new("a sound input is refused", line));
         }
-        if line.is_empty() || line.contains('\n') || line.chars().count() > MOST_LINE {
+        let is_line = !F::IS_LINE || !line.contains('\n');
+        if line.is_empty() || !is_line || line.chars().count() > MOST_LINE {
             return Err(Fault::new("a refusal is not one line", line));
         }
-        if F::NAMES_FILE && !files.0.iter().any(|(name, _)| line.contains(name)) {
+        // Of a set of files, one that is not there.
+        let folder = trial.folder.to_string_lossy();
+        if F::NAMES_FILE && !line.contains(&*folder) && !files.0.iter().any(|(name, _)| line.contains(name)) {
             return Err(Fault::new("a refusal names no file", line));
         }
         Ok(Outcome::Stopped)

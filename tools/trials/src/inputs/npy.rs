@@ -9,8 +9,26 @@ use std::path::Path;
 
 /// Words of headers.
 const NAMES: &[&str] = &[
-    "'descr':", "'fortran_order':", "'shape':", "True", "False", "'<f8'", "'>f4'", "'<i8'", "'O'", "'|S5'",
-    "[('a', '<f4')]", "(1, 8)", "(0, 6)", "(3,)", "()", "((((", "}", "{", "(18446744073709551615, 8)", "'",
+    "'descr':",
+    "'fortran_order':",
+    "'shape':",
+    "True",
+    "False",
+    "'<f8'",
+    "'>f4'",
+    "'<i8'",
+    "'O'",
+    "'|S5'",
+    "[('a', '<f4')]",
+    "(1, 8)",
+    "(0, 6)",
+    "(3,)",
+    "()",
+    "((((",
+    "}",
+    "{",
+    "(18446744073709551615, 8)",
+    "'",
 ];
 
 /// NumPy files.
@@ -19,6 +37,7 @@ pub struct Npy;
 impl Format for Npy {
     const NAME: &'static str = "inputs/npy";
     const ABOUT: &'static str = "NumPy files of rays, points and pairs: headers and numbers";
+    const IS_LINE: bool = false;
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
         let (rows, columns) = (random.below(9), random.pick([3, 6, 8]));
@@ -34,7 +53,8 @@ impl Format for Npy {
         let (version, width_of_length) = if random.chance(70) { (1, 2) } else { (2, 4) };
         text.resize((8 + width_of_length + text.len() + 1).next_multiple_of(64) - 8 - width_of_length - 1, b' ');
         text.push(b'\n');
-        let mut file = [b"\x93NUMPY", &[version, 0][..], &(text.len() as u32).to_le_bytes()[..width_of_length]].concat();
+        let mut file =
+            [b"\x93NUMPY", &[version, 0][..], &(text.len() as u32).to_le_bytes()[..width_of_length]].concat();
         file.extend(text);
         file.extend((0..rows * columns * width).map(|_| random.word() as u8));
         harm.bytes(random, &mut file, 40);
@@ -55,7 +75,9 @@ impl Format for Npy {
         };
         match read {
             Ok((count, shape)) if count as u64 == shape.iter().product::<u64>() => Ok(Verdict::Read),
-            Ok((count, shape)) => Err(Fault::new("rows are not as many as the shape says", format!("{count} {shape:?}"))),
+            Ok((count, shape)) => {
+                Err(Fault::new("rows are not as many as the shape says", format!("{count} {shape:?}")))
+            }
             Err(error) => refused(&error),
         }
     }

@@ -27,7 +27,8 @@ impl Format for Obj {
         let has_colors = random.chance(30);
         for _ in 0..vertices {
             let mut number = || random.below(2001) as f64 / 100.0 - 10.0;
-            let _ = writeln!(text, "v {} {} {}{}", number(), number(), number(), if has_colors { " 1 0 0.5" } else { "" });
+            let _ =
+                writeln!(text, "v {} {} {}{}", number(), number(), number(), if has_colors { " 1 0 0.5" } else { "" });
             let _ = writeln!(text, "vt {} {}\nvn 0 0 1", number(), number());
         }
         for _ in 0..random.within(1, 8) {

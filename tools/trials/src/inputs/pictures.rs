@@ -47,7 +47,8 @@ pub struct Pictures;
 
 impl Format for Pictures {
     const NAME: &'static str = "inputs/pictures";
-    const ABOUT: &'static str = "PNG and OpenEXR pictures as compare reads them: chunks with right checksums, headers, blocks";
+    const ABOUT: &'static str =
+        "PNG and OpenEXR pictures as compare reads them: chunks with right checksums, headers, blocks";
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
         if random.chance(50) {

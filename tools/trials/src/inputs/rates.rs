@@ -10,8 +10,24 @@ use std::path::Path;
 
 /// Keys of the file.
 const NAMES: &[&str] = &[
-    "version", "devices", "any", "scenes", "name", "rates", "primary", "byte", "flip", "exact", "methods", "effect",
-    "making", "sample", "ray", "percent", "flip_error", "diffuse",
+    "version",
+    "devices",
+    "any",
+    "scenes",
+    "name",
+    "rates",
+    "primary",
+    "byte",
+    "flip",
+    "exact",
+    "methods",
+    "effect",
+    "making",
+    "sample",
+    "ray",
+    "percent",
+    "flip_error",
+    "diffuse",
 ];
 
 /// Files of rates.
@@ -24,7 +40,8 @@ impl Format for RateFiles {
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
         let method = json!({"effect": "diffuse", "name": "roma", "making": 0.5, "sample": 0.1, "ray": 1e-7,
             "percent": [1, 2], "flip_error": [0.01, 0.02]});
-        let rates = json!({"primary": 1e-7, "byte": 1e-9, "flip": 1e-8, "exact": {"diffuse": 2e-7}, "methods": [method]});
+        let rates =
+            json!({"primary": 1e-7, "byte": 1e-9, "flip": 1e-8, "exact": {"diffuse": 2e-7}, "methods": [method]});
         let scenes = json!({"0123456789abcdef": {"name": "a", "rates": rates}});
         let mut root = json!({"version": 1, "devices": {"cpu": {"any": rates, "scenes": scenes}}});
         harm.json(random, &mut root, NAMES, 90);

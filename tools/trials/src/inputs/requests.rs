@@ -10,8 +10,29 @@ use std::path::Path;
 
 /// Keys and texts of traces.
 const NAMES: &[&str] = &[
-    "format", "policy", "round-robin", "second-chance", "lru", "budget_bytes", "page_bytes", "passes", "sizes", "tiles",
-    "frame", "pass", "requests", "batches", "g0", "a0", "t0", "g4294967295", "t9", "x1", "g-1", "g", "primary",
+    "format",
+    "policy",
+    "round-robin",
+    "second-chance",
+    "lru",
+    "budget_bytes",
+    "page_bytes",
+    "passes",
+    "sizes",
+    "tiles",
+    "frame",
+    "pass",
+    "requests",
+    "batches",
+    "g0",
+    "a0",
+    "t0",
+    "g4294967295",
+    "t9",
+    "x1",
+    "g-1",
+    "g",
+    "primary",
 ];
 
 /// Traces of requests.

@@ -17,13 +17,15 @@ pub struct RowFiles;
 impl Format for RowFiles {
     const NAME: &'static str = "inputs/rows";
     const ABOUT: &'static str = "rows.jsonl: what is read goes on, and keeps every measurement";
+    const IS_LINE: bool = false;
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
         let mut lines = vec![json!({"format": 3, "settings": {"spp": 4}, "adapter": {"name": "cpu"}, "commit": "c"})];
         lines.extend((0..random.below(6)).map(|at| json!({"key": format!("k{at}"), "values": {"a": at, "b": 0.5}})));
         let at = random.below(lines.len());
         harm.json(random, &mut lines[at], NAMES, 60);
-        let mut text = lines.iter().map(Value::to_string).fold(String::new(), |all, line| all + &line + "\n").into_bytes();
+        let mut text =
+            lines.iter().map(Value::to_string).fold(String::new(), |all, line| all + &line + "\n").into_bytes();
         harm.bytes(random, &mut text, 50);
         Files::one("rows.jsonl", text)
     }
@@ -39,7 +41,8 @@ impl Format for RowFiles {
         let before = rows.all().to_vec();
         let fresh = Row { key: "fresh".into(), values: [("a".to_owned(), 1.0)].into() };
         let went_on = rows.push(fresh.clone()).and_then(|()| Rows::open(path, header, true));
-        let expected = if before.iter().any(|row| row.key == "fresh") { before } else { [before, vec![fresh]].concat() };
+        let expected =
+            if before.iter().any(|row| row.key == "fresh") { before } else { [before, vec![fresh]].concat() };
         match went_on {
             Ok(rows) if rows.all() == expected => Ok(Verdict::Read),
             Ok(rows) => Err(Fault::new("measurements are lost", format!("{:?}", rows.all()))),

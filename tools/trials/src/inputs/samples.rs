@@ -52,7 +52,8 @@ impl Format for Samples {
         let folder = model.parent().unwrap_or(Path::new("."));
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut files = vec![(name(model), std::fs::read(model).unwrap_or_default())];
-        let mut others: Vec<PathBuf> = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
+        let mut others: Vec<PathBuf> =
+            std::fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path()).collect();
         others.sort();
         for other in others.iter().filter(|other| *other != model && other.is_file()) {
             files.push((name(other), std::fs::read(other).unwrap_or_default()));

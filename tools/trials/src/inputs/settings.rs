@@ -10,9 +10,37 @@ use std::path::Path;
 
 /// Words of settings files.
 const NAMES: &[&str] = &[
-    "true", "false", "off", "auto", "\"off\"", "\"auto\"", "\"exact\"", "\"1G\"", "\"5%\"", "\"640x360\"", "=", "[", "]",
-    "[[", "{", "}", "\"", "'''", "\\u0000", "inf", "nan", "1979-05-27", "0x7fffffffffffffff", "\"4ms,2M\"",
-    "\"cpu\"", "\"diffuse,ao\"", "\"roma\"", "\"1,2,3\"", "\"99999999999999999999G\"", "\"1e400\"", "#",
+    "true",
+    "false",
+    "off",
+    "auto",
+    "\"off\"",
+    "\"auto\"",
+    "\"exact\"",
+    "\"1G\"",
+    "\"5%\"",
+    "\"640x360\"",
+    "=",
+    "[",
+    "]",
+    "[[",
+    "{",
+    "}",
+    "\"",
+    "'''",
+    "\\u0000",
+    "inf",
+    "nan",
+    "1979-05-27",
+    "0x7fffffffffffffff",
+    "\"4ms,2M\"",
+    "\"cpu\"",
+    "\"diffuse,ao\"",
+    "\"roma\"",
+    "\"1,2,3\"",
+    "\"99999999999999999999G\"",
+    "\"1e400\"",
+    "#",
 ];
 
 /// Settings files.
@@ -40,7 +68,9 @@ impl Format for SettingsFiles {
             Ok(settings) => settings,
             Err(error) => return Ok(Verdict::Refused(error.to_string())),
         };
-        let same = |all: &Settings| Settings::entries().iter().all(|entry| all.get(&entry.key()) == settings.get(&entry.key()));
+        let same = |all: &Settings| {
+            Settings::entries().iter().all(|entry| all.get(&entry.key()) == settings.get(&entry.key()))
+        };
         for written in [settings.to_toml(), settings.to_given_toml()] {
             match Settings::from_toml(&written) {
                 Ok(again) if same(&again) => {}

@@ -15,7 +15,7 @@ pub static SCENE: Kills = Kills {
     words: "scene city --triangles 60K --brick-triangles 2K -o a.bricks",
     again: "--resume",
     output: Some("a.bricks"),
-    keeps: &[".a.bricks.scratch"],
+    keeps: &[],
 };
 
 /// `scene` beyond memory.
@@ -26,7 +26,7 @@ pub static SCENE_MEMORY: Kills = Kills {
     words: "scene city --triangles 200K --memory 56M --brick-triangles 1K --threads 2 -o a.bricks",
     again: "--resume",
     output: Some("a.bricks"),
-    keeps: &[".a.bricks.scratch"],
+    keeps: &[],
 };
 
 /// `convert`.
@@ -37,7 +37,7 @@ pub static CONVERT: Kills = Kills {
     words: "convert in.glb --brick-triangles 2K -o a.bricks",
     again: "--resume",
     output: Some("a.bricks"),
-    keeps: &[".a.bricks.scratch"],
+    keeps: &[],
 };
 
 /// `convert --memory`.
@@ -48,7 +48,7 @@ pub static CONVERT_MEMORY: Kills = Kills {
     words: "convert in.glb --memory 56M --brick-triangles 1K --threads 2 -o a.bricks",
     again: "--resume",
     output: Some("a.bricks"),
-    keeps: &[".a.bricks.scratch"],
+    keeps: &[],
 };
 
 /// `convert --lod on`.
@@ -59,7 +59,7 @@ pub static LEVELS: Kills = Kills {
     words: "convert in.glb --lod on --brick-triangles 2K -o a.bricks",
     again: "",
     output: Some("a.bricks"),
-    keeps: &[".a.bricks.scratch"],
+    keeps: &[],
 };
 
 /// `bake-displacement`.
@@ -101,7 +101,8 @@ pub static DVF: Kills = Kills {
     name: "kills/dvf",
     about: "walk that makes a field of visibility and keeps it",
     before: &[CITY],
-    words: "walk a.bricks -o out --frames 1 --size 32x18 --adapter cpu --effects primary,environment --secondary dvf",
+    words: "walk a.bricks -o out --frames 1 --size 32x18 --adapter cpu --effects primary,environment --secondary dvf \
+            --dvf-points 2000 --dvf-rays 16 --dvf-cells 8 --dvf-octahedral 8",
     again: "",
     output: Some("a.dvf"),
     keeps: &["out/"],

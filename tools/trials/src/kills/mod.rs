@@ -62,7 +62,7 @@ impl Kind for Kills {
     }
 
     fn limits(&self) -> Limits {
-        Limits { seconds: 240.0, bytes: 1 << 30 }
+        Limits { seconds: 400.0, bytes: 1 << 30 }
     }
 
     fn trial(&self, trial: &Trial) -> Result<Outcome, Fault> {
@@ -80,7 +80,8 @@ impl Kind for Kills {
         let before = Snapshot::read(folder)?;
         let run = end.run(self.command(trial, folder, ""))?;
         let about = |text: String| format!("{end}: {text}; status {:?}: {}", run.status, run.said);
-        self.judge(&end, &run, &whole, &before, folder).map_err(|Fault { what, text }| Fault { what, text: about(text) })?;
+        self.judge(&end, &run, &whole, &before, folder)
+            .map_err(|Fault { what, text }| Fault { what, text: about(text) })?;
         let is_done = run.status == Some(0);
         let again = if random.chance(75) { self.again } else { "" };
         let last = End::None.run(self.command(trial, folder, again))?;
@@ -154,7 +155,10 @@ impl Kills {
         if let Some(name) = self.output {
             let (now, then, new) = (after.get(name), before.get(name), whole.files.get(name));
             if now != then && now != new {
-                return Err(Fault::new("a file is neither old nor new", format!("{name}: {:?} bytes", now.map(<[u8]>::len))));
+                return Err(Fault::new(
+                    "a file is neither old nor new",
+                    format!("{name}: {:?} bytes", now.map(<[u8]>::len)),
+                ));
             }
         }
         if let Some(broken) = after.broken(before) {
@@ -163,9 +167,9 @@ impl Kills {
         // Who is killed leaves what the next run takes away.
         if end.leaves_nothing() {
             let is_kept = |name: &str| self.keeps.iter().any(|keeps| name.starts_with(keeps));
-            let extra = after.names().find(|name| {
-                before.get(name).is_none() && whole.files.get(name).is_none() && !is_kept(name)
-            });
+            let extra = after
+                .names()
+                .find(|name| before.get(name).is_none() && whole.files.get(name).is_none() && !is_kept(name));
             if let Some(name) = extra {
                 return Err(Fault::new("a temporary file is left", name));
             }

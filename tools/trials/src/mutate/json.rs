@@ -90,7 +90,9 @@ fn string(random: &mut Random, old: &str, names: &[&str]) -> String {
         3 => format!("../{old}"),
         4 => format!("{old}\u{0}\n\u{7}%00é"),
         5 => old.chars().skip(random.below(old.len() + 1)).collect(),
-        6 => random.pick(["data:,", "data:;base64,AAA", "http://a/b", "file:///dev/zero", ".", "/", "a?b#c", "%ff"]).into(),
+        6 => random
+            .pick(["data:,", "data:;base64,AAA", "http://a/b", "file:///dev/zero", ".", "/", "a?b#c", "%ff"])
+            .into(),
         _ => random.pick_from(names).map_or_else(String::new, |name| (*name).to_owned()),
     }
 }

@@ -2,6 +2,9 @@
 
 use crate::random::Random;
 
+/// Most bytes of a text: words are repeated.
+const MOST_BYTES: usize = 1 << 16;
+
 /// Words that stand where others should.
 const WORDS: [&str; 18] = [
     "0",
@@ -64,4 +67,5 @@ pub fn change(random: &mut Random, text: &mut Vec<u8>, names: &[&str]) {
         }
     }
     *text = pieces.concat();
+    text.truncate(MOST_BYTES);
 }
