@@ -97,3 +97,6 @@ pub mod stream;
 pub mod view;
 
 pub use session::{Session, Settings};
+
+/// The commit that this program was built from, `unknown` without git.
+pub const COMMIT: &str = env!("BRICKWALK_COMMIT");

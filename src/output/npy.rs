@@ -1,7 +1,7 @@
 //! NumPy `.npy` files: rays in, hits out.
 
 use super::atomic;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use bricks::planted::{self, Defect};
 use bytemuck::{Pod, Zeroable};
 use npyz::{DType, Field, NpyFile, Order, TypeStr, WriteOptions, WriterBuilder};
@@ -103,7 +103,10 @@ fn read_rows<T>(path: &Path, what: &str, widths: &[u64], row: impl Fn(&[f64]) ->
     let length = file.metadata().with_context(|| format!("{name}: cannot read the {what}"))?.len();
     let (header, header_bytes) = read_header(&mut file)
         .with_context(|| format!("{name}: not a NumPy file; write it with numpy.save(path, array)"))?;
+    // What a parser says repeats the header and draws arrows to it: of that the first line.
+    let first = |error: std::io::Error| anyhow!(error.to_string().lines().next().unwrap_or_default().to_owned());
     let header = NpyFile::new(Cursor::new(header))
+        .map_err(first)
         .with_context(|| format!("{name}: its NumPy header is damaged; write it with numpy.save(path, array)"))?;
     let shapes: Vec<String> = widths.iter().rev().map(|width| format!("(..., {width})")).collect();
     let remedy = format!(
@@ -376,6 +379,19 @@ mod tests {
             }
         }
         assert!(refused > 100, "{refused}");
+    }
+
+    #[test]
+    fn what_a_parser_says_is_one_short_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.npy");
+        let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': (0, 8), }}{}0\n", " ".repeat(5000));
+        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+        bytes.extend((text.len() as u16).to_le_bytes());
+        bytes.extend(text.into_bytes());
+        std::fs::write(&path, &bytes).unwrap();
+        let line = format!("{:#}", read_rays(&path).unwrap_err());
+        assert!(line.contains("its NumPy header is damaged") && !line.contains('\n') && line.len() < 500, "{line}");
     }
 
     #[test]

@@ -9,7 +9,7 @@ const MOST_FILES: usize = 25;
 /// Most columns of a comment.
 const MOST_COLUMNS: usize = 120;
 /// Crates, by the folders of their sources.
-const CRATES: [&str; 7] = [
+const CRATES: [&str; 8] = [
     "src",
     "bricks/src",
     "tools/bucket/src",
@@ -17,6 +17,7 @@ const CRATES: [&str; 7] = [
     "tools/python/src",
     "tools/report/src",
     "tools/scenes/src",
+    "tools/trials/src",
 ];
 
 fn root() -> PathBuf {
@@ -167,6 +168,7 @@ fn files_that_comments_and_pages_name_are_there() {
             let is_missing = |name: &&str| {
                 let places =
                     ["", "bricks", "tools/bucket", "tools/convert", "tools/python", "tools/report", "tools/scenes"];
+                    ["", "bricks", "tools/convert", "tools/python", "tools/report", "tools/scenes", "tools/trials"];
                 !places.iter().any(|place| root().join(place).join(name).exists())
             };
             missing.extend(lines.flat_map(named_files).filter(is_missing).map(|name| format!("{file} names {name}")));

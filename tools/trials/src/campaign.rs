@@ -120,7 +120,7 @@ fn note(
     let trials = slice.to - from;
     let row = &mut state.kinds[at];
     *row = (slice.to, row.1.saturating_sub(trials), false, row.3 + slice.seconds);
-    let commit = commit();
+    let commit = brickwalk::COMMIT.to_owned();
     for Told { seed, what, text } in slice.findings {
         let sort = state.sorts.entry((kind.name().into(), what.clone())).or_default();
         *sort += 1;
@@ -147,16 +147,4 @@ fn push(state: &mut State, line: Line) -> Result<()> {
     }
     state.done.lines.push(line);
     Ok(())
-}
-
-/// The commit of the checkout, `unknown` where there is none.
-fn commit() -> String {
-    static COMMIT: std::sync::OnceLock<String> = std::sync::OnceLock::new();
-    let ask = || {
-        let folder = env!("CARGO_MANIFEST_DIR");
-        let git = std::process::Command::new("git").args(["-C", folder, "rev-parse", "--short=12", "HEAD"]).output();
-        let said = git.ok().filter(|git| git.status.success()).and_then(|git| String::from_utf8(git.stdout).ok());
-        said.map_or_else(|| "unknown".into(), |said| said.trim().to_owned())
-    };
-    COMMIT.get_or_init(ask).clone()
 }

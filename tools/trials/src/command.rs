@@ -153,13 +153,13 @@ fn tell(finding: &Finding) {
 
 /// The kinds whose names begin as one of `only`, and that can run here; all without any.
 fn chosen(only: &[String]) -> Result<Vec<&'static dyn Kind>> {
-    let is_chosen = |name: &str| only.is_empty() || only.iter().any(|only| name.starts_with(only.as_str()));
+    let begins = |name: &str, only: &str| name.starts_with(only) && kinds::find(only).is_none();
+    let is_chosen = |name: &str| only.is_empty() || only.iter().any(|only| begins(name, only));
     let exact = |name: &str| only.iter().any(|only| only == name);
     // The whole name of a kind means that one alone, even where others begin with it.
-    let all: Vec<_> = match kinds::ALL.iter().any(|kind| exact(kind.name())) {
-        true => kinds::ALL.iter().filter(|kind| exact(kind.name())).copied().collect(),
-        false => kinds::ALL.iter().filter(|kind| is_chosen(kind.name())).copied().collect(),
-    };
+    let mut all: Vec<_> = only.iter().filter_map(|name| kinds::find(name)).collect();
+    let others = kinds::ALL.iter().filter(|kind| !exact(kind.name()) && is_chosen(kind.name()));
+    all.extend(others.copied());
     ensure!(!all.is_empty(), "--only {}: there is no such kind; see --list", only.join(" --only "));
     let mut able = Vec::new();
     for kind in all {

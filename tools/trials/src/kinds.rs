@@ -3,6 +3,7 @@
 use crate::inputs;
 use crate::kills::all as kills;
 use crate::kind::Kind;
+use crate::own;
 
 /// All kinds, those that are fast first.
 pub static ALL: [&(dyn Kind + 'static); 35] = [
@@ -43,7 +44,8 @@ pub static ALL: [&(dyn Kind + 'static); 35] = [
     &kills::PARTS,
 ];
 
-/// The kind of this name.
+/// The kind of this name, those that misbehave on purpose among them.
 pub fn find(name: &str) -> Option<&'static dyn Kind> {
-    ALL.into_iter().find(|kind| kind.name() == name)
+    let own = own::ALL.iter().map(|kind| kind as &dyn Kind);
+    ALL.into_iter().chain(own).find(|kind| kind.name() == name)
 }

@@ -17,6 +17,7 @@ pub mod kind;
 pub mod kinds;
 pub mod memory;
 pub mod mutate;
+pub mod own;
 pub mod page;
 #[cfg(feature = "planted")]
 pub mod planted;

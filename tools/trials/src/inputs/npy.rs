@@ -37,7 +37,6 @@ pub struct Npy;
 impl Format for Npy {
     const NAME: &'static str = "inputs/npy";
     const ABOUT: &'static str = "NumPy files of rays, points and pairs: headers and numbers";
-    const IS_LINE: bool = false;
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
         let (rows, columns) = (random.below(9), random.pick([3, 6, 8]));

@@ -41,6 +41,7 @@ pub struct Requests;
 impl Format for Requests {
     const NAME: &'static str = "inputs/requests";
     const ABOUT: &'static str = "Recorded requests, and their replay against all caches";
+    const IS_LINE: bool = false;
     const NAMES_FILE: bool = false;
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {

@@ -79,7 +79,6 @@ pub struct Words;
 impl Format for Words {
     const NAME: &'static str = "inputs/words";
     const ABOUT: &'static str = "Words of the command line: parsed or refused";
-    const MOST_BYTES: u64 = 16 << 20;
     const NAMES_FILE: bool = false;
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
