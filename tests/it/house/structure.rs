@@ -166,10 +166,8 @@ fn files_that_comments_and_pages_name_are_there() {
             let is_code = ending == ".rs" || ending == ".wgsl";
             let lines = text.lines().filter_map(|line| if is_code { comment(line) } else { Some(line) });
             let is_missing = |name: &&str| {
-                let places =
-                    ["", "bricks", "tools/bucket", "tools/convert", "tools/python", "tools/report", "tools/scenes"];
-                    ["", "bricks", "tools/convert", "tools/python", "tools/report", "tools/scenes", "tools/trials"];
-                !places.iter().any(|place| root().join(place).join(name).exists())
+                let crates = CRATES.map(|sources| sources.trim_end_matches("src").trim_end_matches('/'));
+                !crates.iter().any(|place| root().join(place).join(name).exists())
             };
             missing.extend(lines.flat_map(named_files).filter(is_missing).map(|name| format!("{file} names {name}")));
         }

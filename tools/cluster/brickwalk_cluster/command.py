@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -149,6 +150,8 @@ def run(words: Sequence[str] | None = None) -> int:
     options, rest = parser().parse_known_args(words)
     if options.command == "convert" and rest:
         parser().error(f"convert has no {rest[0]}; see brickwalk-cluster convert --help")
+    # What it says of a scheduler that went away is many lines; ours is one.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     try:
         shares_cores = options.command in ("walk", "convert")
         with Cluster(options.scheduler, options.workers, shares_cores=shares_cores) as cluster:

@@ -45,7 +45,7 @@ def test_each_line_runs_by_itself(city, program, whole, tmp_path):
 
 
 def test_bands_are_lines_of_their_own(city, program, run, tmp_path):
-    view = ["--size", "64x128", "--bands", "2", "--quality", "draft", "--adapter", "cpu"]
+    view = ["--size", "64x128", "--bands", "2", "--frames", "1", "--quality", "draft", "--adapter", "cpu"]
     run("walk", city, "-o", tmp_path / "whole", *view)
     line = [program, "jobs", "--format", "lines", "--chunk", "1", "--", "-q", "walk", str(city), "-o", "out", *view]
     lines = subprocess.run(line, cwd=tmp_path, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()

@@ -67,14 +67,15 @@ def bucket(request, tmp_path_factory):
             endpoint = f"http://127.0.0.1:{int(server.stdout.readline())}"
             if request.param == "moto":
                 put(f"{endpoint}/bucket")
-                put(f"{endpoint}/bucket/scenes/a.bricks", file.read_bytes())
+                put(f"{endpoint}/bucket/scenes/moto-a.bricks", file.read_bytes())
             else:
                 (root / "bucket" / "scenes").mkdir()
-                shutil.copy(file, root / "bucket" / "scenes" / "a.bricks")
+                shutil.copy(file, root / "bucket" / "scenes" / "s3s-a.bricks")
             with pytest.MonkeyPatch.context() as patch:
                 for name, value in {**KEYS, "AWS_ENDPOINT": endpoint}.items():
                     patch.setenv(name, value)
-                yield file, "s3://bucket/scenes/a.bricks", request.param
+                # What is counted counts for a URL.
+                yield file, f"s3://bucket/scenes/{request.param}-a.bricks", request.param
         finally:
             server.stdin.close()
             server.wait(timeout=30)
