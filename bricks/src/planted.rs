@@ -34,14 +34,14 @@ macro_rules! defects {
 }
 
 defects! {
-    /// A face of an OBJ file may name a vertex that never comes.
-    ObjVertex = "obj-vertex", "inputs/obj";
-    /// A chunk of a GLB file may be longer than the file.
-    GlbChunk = "glb-chunk", "inputs/glb";
+    /// An image of a texture may be larger than its bytes can hold.
+    ImageSize = "image-size", "inputs/glb";
+    /// Compressed geometry may state more elements than its bytes can hold.
+    MeshoptCount = "meshopt-count", "inputs/meshopt";
     /// A tileset may refer to itself.
     TilesetCircle = "tileset-circle", "inputs/tiles";
-    /// A binary STL file may state more triangles than it holds.
-    StlCount = "stl-count", "inputs/stl";
+    /// A picture may be larger than its bytes can hold.
+    PngSize = "png-size", "inputs/pictures";
     /// A NumPy file may state more rows than it holds.
     NpyRows = "npy-rows", "inputs/npy";
     /// An HDR image may be larger than its bytes can hold.

@@ -2,6 +2,7 @@
 
 use super::color::linear_from_srgb;
 use super::image::Image;
+use bricks::planted::{self, Defect};
 use exr::prelude::{FlatSamples, MetaData, ReadChannels, ReadLayers};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -13,6 +14,9 @@ const MAX_PIXELS: u64 = 1 << 28;
 
 /// Most pixels of a byte of a PNG file: deflate reaches 1032:1, and a grey pixel takes a bit.
 const MAX_PIXELS_A_BYTE: u64 = 8 * 1032;
+
+/// The same of an EXR file, whose pixels take two bytes at least.
+const MAX_EXR_PIXELS_A_BYTE: u64 = 1032;
 
 /// How a file encodes its colours, which decides which FLIP applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +119,8 @@ fn load_png(path: &Path) -> Result<Loaded, LoadError> {
     let (width, height) = reader.into_dimensions().map_err(png)?;
     let pixels = u64::from(width) * u64::from(height);
     // Before memory is taken for them.
-    if pixels > bytes.saturating_mul(MAX_PIXELS_A_BYTE) || pixels > MAX_PIXELS {
+    let fits = pixels <= bytes.saturating_mul(MAX_PIXELS_A_BYTE) || planted::is(Defect::PngSize);
+    if !fits || pixels > MAX_PIXELS {
         let found = format!("{width}x{height} pixels in {bytes} bytes");
         let expected = "images of up to 2^28 pixels are compared, and a file has bytes for its own";
         return Err(LoadError::Unsupported { path: path.to_owned(), found, expected });
@@ -143,12 +148,18 @@ fn load_exr(path: &Path) -> Result<Loaded, LoadError> {
     let unsupported = |found: String, expected| LoadError::Unsupported { path: path.to_owned(), found, expected };
 
     let metadata = MetaData::read_from_file(path, false).map_err(damaged)?;
+    let length = std::fs::metadata(path).map_err(|source| LoadError::Io { path: path.to_owned(), source })?.len();
     let size = metadata.headers.first().map(|header| header.layer_size).unwrap_or_default();
     let (width, height) = (size.width(), size.height());
     for header in &metadata.headers {
         let pixels = header.layer_size.width() as u64 * header.layer_size.height() as u64;
         if pixels > MAX_PIXELS {
             return Err(unsupported(format!("{pixels} pixels"), "images of up to 2^28 pixels are compared"));
+        }
+        // Before memory is taken for them.
+        if pixels > length.saturating_mul(MAX_EXR_PIXELS_A_BYTE) {
+            let found = format!("{width}x{height} pixels in {length} bytes");
+            return Err(unsupported(found, "a file has bytes for its own; it is damaged"));
         }
         if header.layer_size != size {
             let (w, h) = (header.layer_size.width(), header.layer_size.height());
@@ -291,6 +302,14 @@ mod tests {
         let plane = || FlatSamples::F32((0..64).map(|i| i as f32).collect());
         write_exr(&path, 8, 8, ["R", "G", "B"].map(|name| AnyChannel::new(name, plane())).to_vec());
         let bytes = std::fs::read(&path).unwrap();
+        // As with PNG: of its window the largest x is another.
+        let mut huge = bytes.clone();
+        let window = b"dataWindow\0box2i\0";
+        let at = huge.windows(window.len()).position(|part| part == window).unwrap() + window.len() + 4;
+        huge[at + 8..at + 12].copy_from_slice(&3_000_000i32.to_le_bytes());
+        std::fs::write(&path, huge).unwrap();
+        let text = load(&path).unwrap_err().to_string();
+        assert!(text.contains("3000001x8 pixels in "), "{text}");
         for keep in (4..bytes.len()).step_by(bytes.len() / 13) {
             check("cut.exr", &bytes[..keep]);
         }

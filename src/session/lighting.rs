@@ -217,8 +217,14 @@ fn read_hdr(path: &Path) -> Result<Equirectangular> {
 }
 
 fn read_exr(path: &Path) -> Result<Equirectangular> {
+    let bytes = std::fs::metadata(path)?.len();
     for header in &MetaData::read_from_file(path, false)?.headers {
-        check_size(header.layer_size.0, header.layer_size.1)?;
+        let (width, height) = (header.layer_size.0, header.layer_size.1);
+        check_size(width, height)?;
+        // Deflate reaches 1032:1, and a texel takes two bytes at least.
+        if (width * height) as u64 > bytes.saturating_mul(1032) {
+            bail!("its {bytes} bytes cannot hold {width} x {height} texels");
+        }
     }
     let image = exr::prelude::read()
         .no_deep_data()
@@ -277,5 +283,11 @@ mod tests {
         let whole = std::fs::read(&path).unwrap();
         assert!(refused(&file("cut.exr", &whole[..whole.len() - 9])).contains("truncated"));
         assert!(refused(&file("head.exr", &whole[..40])).contains("truncated"));
+        let mut vast = whole;
+        let window = b"dataWindow\0box2i\0";
+        let at = vast.windows(window.len()).position(|part| part == window).unwrap() + window.len() + 4;
+        vast[at + 8..at + 12].copy_from_slice(&15_999i32.to_le_bytes());
+        vast[at + 12..at + 16].copy_from_slice(&7_999i32.to_le_bytes());
+        assert!(refused(&file("vast.exr", &vast)).contains("cannot hold 16000 x 8000"));
     }
 }

@@ -9,6 +9,7 @@ use crate::{kinds, tally, worker};
 use anyhow::{Context, Result, bail, ensure};
 use brickwalk::output::atomic;
 use clap::{Parser, Subcommand};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -76,6 +77,12 @@ enum Other {
     },
 }
 
+/// Prints, if anybody listens.
+pub fn say(text: &str) {
+    let mut out = std::io::stdout();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
 /// Runs the command line of this process.
 pub fn main() -> ExitCode {
     match run(&Words::parse()) {
@@ -95,7 +102,7 @@ fn run(words: &Words) -> Result<ExitCode> {
             for file in files {
                 lines.extend(tally::read(file)?.0);
             }
-            print!("{}", page::table(&lines));
+            say(&page::table(&lines));
             return Ok(ExitCode::SUCCESS);
         }
         #[cfg(feature = "planted")]
@@ -107,12 +114,8 @@ fn run(words: &Words) -> Result<ExitCode> {
     }
     if words.list {
         for kind in kinds::ALL {
-            println!(
-                "{:24} {}{}",
-                kind.name(),
-                kind.about(),
-                kind.lacks().map_or_else(String::new, |why| { format!(" (not here: {why})") })
-            );
+            let why = kind.lacks().map_or_else(String::new, |why| format!(" (not here: {why})"));
+            say(&format!("{:24} {}{why}\n", kind.name(), kind.about()));
         }
         return Ok(ExitCode::SUCCESS);
     }
@@ -131,24 +134,19 @@ fn run(words: &Words) -> Result<ExitCode> {
         kept = Some(Tally::open(&words.out.join("trials.jsonl"))?);
     }
     let done = campaign::run(&plan, kept.as_mut(), &tell)?;
-    print!("{}", page::table(&done.lines));
+    say(&page::table(&done.lines));
     if let Some(kept) = &kept {
         let file = words.out.join("trials.html");
         atomic::write(&file, page::page(kept.lines()).as_bytes())?;
-        println!("{}", file.display());
+        say(&format!("{}\n", file.display()));
     }
     let found = done.lines.iter().any(|line| matches!(line, Line::Finding(_)));
     Ok(ExitCode::from(u8::from(found)))
 }
 
 fn tell(finding: &Finding) {
-    println!(
-        "{}: {}\n    {}\n    {}",
-        finding.kind,
-        finding.what,
-        finding.text.replace('\n', "\n    "),
-        finding.command
-    );
+    let text = finding.text.replace('\n', "\n    ");
+    say(&format!("{}: {}\n    {text}\n    {}\n", finding.kind, finding.what, finding.command));
 }
 
 /// The kinds whose names begin as one of `only`, and that can run here; all without any.

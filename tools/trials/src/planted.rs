@@ -1,5 +1,6 @@
 //! Plants defects, one after the other, and counts the trials until each is found.
 
+use crate::command::say;
 use crate::kinds;
 use crate::slice::{self, How};
 use anyhow::{Context, Result, ensure};
@@ -7,7 +8,7 @@ use bricks::planted::Defect;
 use std::process::ExitCode;
 
 /// Seconds for a defect.
-const SECONDS: f64 = 600.0;
+const SECONDS: f64 = 120.0;
 
 /// Plants every defect, or the one called `only`, tries the kind that has to find it from `seed` on, at most `tries`
 /// times, and prints a table. Each is also tried without the defect, as many times: that has to find nothing.
@@ -18,8 +19,7 @@ pub fn run(how: &How, tries: u64, only: Option<&str>, seed: u64) -> Result<ExitC
     let chosen: Vec<Defect> =
         Defect::ALL.into_iter().filter(|defect| only.is_none_or(|only| only == defect.name())).collect();
     ensure!(!chosen.is_empty(), "there is no such defect");
-    println!("| defect | kind | found at try | as | without it |");
-    println!("| --- | --- | ---: | --- | --- |");
+    say("| defect | kind | found at try | as | without it |\n| --- | --- | ---: | --- | --- |\n");
     let mut are_all_found = true;
     for defect in chosen {
         let kind = kinds::find(defect.kind()).with_context(|| format!("{}: there is no such kind", defect.kind()))?;
@@ -32,7 +32,7 @@ pub fn run(how: &How, tries: u64, only: Option<&str>, seed: u64) -> Result<ExitC
         let count = found.as_ref().map_or(0, |told| told.seed - seed + 1);
         let sound = slice::run(kind, how, seed, count, SECONDS)?;
         let without = if sound.found == 0 { "nothing" } else { "something" };
-        println!("| {} | {} | {at} | {what} | {without} |", defect.name(), kind.name());
+        say(&format!("| {} | {} | {at} | {what} | {without} |\n", defect.name(), kind.name()));
         are_all_found &= found.is_some() && sound.found == 0;
     }
     Ok(ExitCode::from(u8::from(!are_all_found)))

@@ -10,7 +10,6 @@ use super::plain::{self, fault, no_room, unreadable};
 use super::table::{Table, TableWriter};
 use super::text::Tokens;
 use crate::source::{Primitive, SourceError, SourceTexture};
-use bricks::planted::{self, Defect};
 use std::path::Path;
 use xxhash_rust::xxh3::Xxh3;
 
@@ -55,7 +54,7 @@ pub(super) fn open(
     } else {
         bytes.hash(spool, &mut hash).map_err(|e| unreadable(path, &e))?;
         let stated = stated.ok_or_else(|| fault(path, "header", "the file is neither binary nor ASCII STL"))?;
-        if stated > held && !planted::is(Defect::StlCount) {
+        if stated > held {
             let problem = format!("states {stated} triangles, but the file can hold {held}");
             return Err(fault(path, "header", problem));
         }

@@ -32,6 +32,13 @@ pub struct Environment;
 fn hdr(random: &mut Random, harm: Harm) -> Vec<u8> {
     let (width, height) = (random.pick([1, 2, 8, 9, 16]), random.within(1, 4));
     let text = format!("#?RADIANCE\n# made here\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n");
+    let text = match harm.does(random, 10) {
+        true => {
+            let [height, width] = [0; 2].map(|_: i32| random.pick([0, 1, 40, 4096, 8192, 16384, 1 << 20]));
+            text.replace("-Y", &format!("-Y {height} +X {width}\n# "))
+        }
+        false => text,
+    };
     let mut header = text.into_bytes();
     harm.words(random, &mut header, NAMES, 45);
     let mut rows = Vec::new();

@@ -142,6 +142,9 @@ impl Format for Tiles {
         if random.chance(25) {
             let mut other = json!({"asset": {"version": "1.0"}, "geometricError": 9,
                 "root": {"content": {"uri": "a.glb"}, "refine": "REPLACE"}});
+            if harm.does(random, 5) {
+                other["root"]["content"]["uri"] = json!(random.pick(["other.json", "tileset.json"]));
+            }
             harm.json(random, &mut other, NAMES, 40);
             others.push(("other.json".into(), other.to_string().into_bytes()));
             children.push(json!({"content": {"uri": "other.json"}}));

@@ -113,7 +113,7 @@ pub static STUDY: Kills = Kills {
     name: "kills/study",
     about: "study, which goes on where it stopped",
     before: &[CITY],
-    words: "study --quick --scene a.bricks --output out --adapter cpu --effects ao --caches 100 --size 32x18 --samples 4 \
+    words: "study a.bricks --quick --output out --adapter cpu --effects ao --caches 100 --size 32x18 --samples 4 \
             --repeat 1",
     again: "",
     output: None,

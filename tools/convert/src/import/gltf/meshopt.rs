@@ -4,6 +4,7 @@
 use super::document::Meshopt;
 use super::file::{File, Problem};
 use crate::import::error::{EXPORT_AGAIN, ImportError};
+use bricks::planted::{self, Defect};
 use meshopt::ffi;
 use std::collections::HashMap;
 use std::ffi::c_void;
@@ -70,9 +71,11 @@ fn decode(file: &File, json: &Meshopt, total: &mut u64) -> Result<Vec<u8>, Probl
         let what = "its mode, filter, stride and count are not ones that the extension allows";
         return Err(Problem::new(what));
     }
-    let length = count.checked_mul(stride).filter(|&length| length / MAX_RATIO <= encoded.len());
+    let fits = |length: &u64| length / MAX_RATIO <= encoded.len() || planted::is(Defect::MeshoptCount);
+    let length = count.checked_mul(stride).filter(fits);
     *total = total.saturating_add(length.unwrap_or(u64::MAX));
-    let length = length.filter(|_| *total <= FREE_BYTES || *total / MAX_TOTAL_RATIO <= file.input_bytes);
+    let is_free = *total <= FREE_BYTES || planted::is(Defect::MeshoptCount);
+    let length = length.filter(|_| is_free || *total / MAX_TOTAL_RATIO <= file.input_bytes);
     let too_many = || Problem::new(format!("states {count} elements, more than {} bytes can hold", encoded.len()));
     let length = usize::try_from(length.ok_or_else(too_many)?).map_err(|_| too_many())?;
     let encoded = encoded.read().map_err(|what| Problem { what, remedy: EXPORT_AGAIN })?;

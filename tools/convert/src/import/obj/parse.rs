@@ -8,7 +8,6 @@ use crate::import::table::{Table, TableWriter};
 use crate::import::text::{Lines, number};
 use crate::import::warnings::Warnings;
 use bricks::NONE;
-use bricks::planted::{self, Defect};
 use std::collections::HashMap;
 use std::io::BufReader;
 use std::path::Path;
@@ -238,7 +237,7 @@ impl Parser<'_> {
 
     fn finish(self) -> Result<Parsed, ImportError> {
         let count = self.positions.count();
-        if self.ahead.index > count && !planted::is(Defect::ObjVertex) {
+        if self.ahead.index > count {
             let what = format!("refers to vertex {}, but the file has {count}", self.ahead.index);
             return Err(fault(self.path, format!("line {}", self.ahead.line), what));
         }
