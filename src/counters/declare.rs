@@ -60,9 +60,7 @@ macro_rules! counters {
 
             /// The sets of bricks that records have, by name.
             pub(super) fn sets(&self) -> Vec<(&'static str, &Bricks)> {
-                let mut sets = Vec::new();
-                $(counters! { @set self sets $column $sum [$($unwritten)?] })*
-                sets
+                [$(counters! { @set self $column $sum [$($unwritten)?] }),*].into_iter().flatten().collect()
             }
 
             /// The names and values of what kernels count.
@@ -125,8 +123,8 @@ macro_rules! counters {
     (@add names $to:expr, $from:expr) => { $to.add(&$from); };
     (@each distinct $work:ident, $set:expr) => { $work(&mut $set); };
     (@each $kind:ident $work:ident, $set:expr) => {};
-    (@set $self:ident $sets:ident $name:ident distinct []) => { $sets.push((stringify!($name), &$self.$name)); };
-    (@set $self:ident $sets:ident $name:ident $sum:ident [$($unwritten:ident)?]) => {};
+    (@set $self:ident $name:ident distinct []) => { Some((stringify!($name), &$self.$name)) };
+    (@set $self:ident $name:ident $sum:ident [$($unwritten:ident)?]) => { None };
     (@entry $self:ident $map:ident $name:ident $sum:ident [unwritten]) => {};
     (@entry $self:ident $map:ident $name:ident derived []) => {
         $map.serialize_entry(stringify!($name), &$self.$name())?;

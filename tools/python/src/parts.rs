@@ -39,7 +39,7 @@ impl Held {
         let part = session.part(number, &mut Watching(task))?.ok_or_else(|| anyhow!("interrupted"))?;
         std::fs::create_dir_all(parts::folder(output))?;
         part.write(output, &self.key)?;
-        Ok((Some(part.made), session.take_warnings()))
+        Ok((Some(part.made), [session.take_warnings(), remote::take_warnings()].concat()))
     }
 }
 

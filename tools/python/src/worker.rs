@@ -6,9 +6,12 @@
 
 use crate::errors::{exception, failed};
 use anyhow::{Result, anyhow};
+use brickwalk::remote;
+use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::any::Any;
+use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -184,7 +187,8 @@ pub struct Desk<S> {
 }
 
 impl<S: State> Desk<S> {
-    /// Has the worker do `work`, and waits for it without holding Python's lock.
+    /// Has the worker do `work`, and waits for it without holding Python's lock. What a person should know of a scene by
+    /// URL is a warning of Python's.
     ///
     /// # Errors
     /// That of `work`; what a signal or `progress` raises: the job then ends as soon as it can.
@@ -216,6 +220,10 @@ impl<S: State> Desk<S> {
                 }
             }
         };
+        for line in remote::take_warnings() {
+            let line = CString::new(line).unwrap_or_default();
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &line, 1)?;
+        }
         result.map_err(|error| exception(&error))
     }
 }

@@ -117,6 +117,9 @@ def test_a_disk_cache_saves_all_but_the_head(bucket, tmp_path):
         np.testing.assert_array_equal(second.cast_rays(rays())["t"], expected["t"])
         stats = second.stats()["remote"]
         assert stats["requests"] == requests + 1 and stats["disk_cache_hits"] > 10
+    # A folder that cannot be written to ends the caching, and nothing else.
+    with pytest.warns(UserWarning, match="disk cache"), brickwalk.Scene.open(url, disk_cache=f"{file}/no,64M") as third:
+        np.testing.assert_array_equal(third.cast_rays(rays())["t"], expected["t"])
     with pytest.raises(ValueError, match="disk_cache"):
         brickwalk.Scene.open(url, disk_cache="nothing")
 
