@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The short form of trials, for every change: fixed seeds, then seeds that nobody tried, whose first is printed. It takes
-# less than three minutes on two cores. Options go to both runs.
+# The short form of trials, for every change: fixed seeds, then seeds that nobody tried, whose first is printed. It
+# takes less than three minutes on two cores. Options go to both runs.
 set -euo pipefail
 
 root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/../.." && pwd)

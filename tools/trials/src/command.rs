@@ -62,6 +62,12 @@ enum Other {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
+    /// Print the tallies of files in as few lines as can be
+    Join {
+        /// Files of tallies
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
     /// Plant defects, one after the other, and count the trials until each is found
     #[cfg(feature = "planted")]
     Planted {
@@ -98,11 +104,13 @@ fn run(words: &Words) -> Result<ExitCode> {
     match &words.other {
         Some(Other::Work(work)) => return worker::run(work).map(|()| ExitCode::SUCCESS),
         Some(Other::Table { files }) => {
-            let mut lines = Vec::new();
-            for file in files {
-                lines.extend(tally::read(file)?.0);
+            say(&page::table(&all(files)?));
+            return Ok(ExitCode::SUCCESS);
+        }
+        Some(Other::Join { files }) => {
+            for line in tally::joined(&all(files)?) {
+                say(&(serde_json::to_string(&line)? + "\n"));
             }
-            say(&page::table(&lines));
             return Ok(ExitCode::SUCCESS);
         }
         #[cfg(feature = "planted")]
@@ -142,6 +150,16 @@ fn run(words: &Words) -> Result<ExitCode> {
     }
     let found = done.lines.iter().any(|line| matches!(line, Line::Finding(_)));
     Ok(ExitCode::from(u8::from(found)))
+}
+
+/// The lines of all files.
+fn all(files: &[PathBuf]) -> Result<Vec<Line>> {
+    let mut lines = Vec::new();
+    for file in files {
+        ensure!(file.exists(), "{}: there is no such file", file.display());
+        lines.extend(tally::read(file)?.0);
+    }
+    Ok(lines)
 }
 
 fn tell(finding: &Finding) {

@@ -166,3 +166,31 @@ pub fn distinct(lines: &[Line]) -> Vec<&Finding> {
     });
     findings.filter(|finding| seen.insert((&finding.kind, &finding.what))).collect()
 }
+
+/// The same in fewer lines: ranges that follow each other are one, and of a sort of findings the first is left.
+pub fn joined(lines: &[Line]) -> Vec<Line> {
+    let mut ranges: Vec<Range> = Vec::new();
+    for line in lines {
+        if let Line::Trials(range) = line {
+            ranges.push(range.clone());
+        }
+    }
+    ranges.sort_by(|a, b| (&a.kind, a.from).cmp(&(&b.kind, b.from)));
+    let mut joined: Vec<Range> = Vec::new();
+    for range in ranges {
+        match joined.last_mut() {
+            Some(last) if last.kind == range.kind && last.commit == range.commit && last.to == range.from => {
+                last.to = range.to;
+                last.passed += range.passed;
+                last.stopped += range.stopped;
+                last.found += range.found;
+                last.seconds += range.seconds;
+                last.peak_bytes = last.peak_bytes.max(range.peak_bytes);
+                last.time = last.time.max(range.time);
+            }
+            _ => joined.push(range),
+        }
+    }
+    let findings = distinct(lines).into_iter().cloned().map(Line::Finding);
+    joined.into_iter().map(Line::Trials).chain(findings).collect()
+}

@@ -92,7 +92,10 @@ impl Format for Motions {
     const ABOUT: &'static str = "Motions: what is read has a pose at every time";
 
     fn make(&self, random: &mut Random, harm: Harm) -> Files {
-        let keyframe = |at: usize, random: &mut Random| json!({"time": at, "translation": numbers::<3>(random), "rotation": [0, 0.6, 0, 0.8], "scale": 1 + at});
+        let keyframe = |at: usize, random: &mut Random| {
+            let translation = numbers::<3>(random);
+            json!({"time": at, "translation": translation, "rotation": [0, 0.6, 0, 0.8], "scale": 1 + at})
+        };
         let mover = |random: &mut Random| {
             let keyframes: Vec<Value> = (0..random.within(1, 5)).map(|at| keyframe(at, random)).collect();
             match random.chance(50) {

@@ -2,7 +2,6 @@
 
 use crate::{counts, run, said};
 use brickwalk_trials::tally::{Line, Range, Tally, distinct, read, sums};
-use std::path::Path;
 
 #[test]
 fn every_way_to_misbehave_is_found_and_repeated() {
@@ -52,6 +51,11 @@ fn tallies_go_on_and_add_up() {
     assert_eq!(distinct(&lines).len(), 1);
     let page = std::fs::read_to_string(folder.path().join("trials.html")).unwrap();
     assert!(page.contains("--only own/fault --seed 2 --count 1") && page.ends_with("</html>"), "{page}");
+    let join = said(&run("join", &[&file]));
+    std::fs::write(folder.path().join("joined"), &join).unwrap();
+    let (joined, _) = read(&folder.path().join("joined")).unwrap();
+    assert_eq!(joined.len(), 2, "a range and a finding: {join}");
+    assert_eq!(sums(&joined)["own/fault"], sum);
     // A line that is none is told, and nothing is lost.
     std::fs::write(&file, "{}\n").unwrap();
     let output = run(&words(2), &[folder.path()]);
@@ -72,10 +76,10 @@ fn seeds_of_other_kinds_do_not_count() {
 
 #[test]
 fn what_is_wrong_is_usage() {
-    for words in ["--only nothing", "--minutes 0", "--keep a --count 2", "table none/such"] {
-        let output = run(words, &[] as &[&Path]);
+    for words in ["--only nothing", "--minutes 0", "--keep a --count 2", "table none/such", "join none/such"] {
+        let output = run(words, &[]);
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        let is_right = output.status.code() == Some(2) || words.starts_with("table");
-        assert!(is_right && (text.starts_with("brickwalk-trials: ") || words.starts_with("table")), "{words}: {text}");
+        assert_eq!(output.status.code(), Some(2), "{words}");
+        assert!(text.starts_with("brickwalk-trials: ") && text.lines().count() == 1, "{words}: {text}");
     }
 }
