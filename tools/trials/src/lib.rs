@@ -2,7 +2,7 @@
 //! run them and what each kind promises.
 //!
 //! A trial ([`kind::Kind::trial`]) runs in a worker process ([`worker`]) that catches panics and counts memory. Who
-//! watches it ([`slice`]) ends one that hangs and follows up one that dies. A [`campaign`] shares time out over kinds
+//! watches it ([`mod@slice`]) ends one that hangs and follows up one that dies. A [`campaign`] shares time out over kinds
 //! and keeps a [`tally`].
 //!
 //! A new kind is a file in `inputs/` or `kills/` and a line in [`kinds`].
