@@ -10,7 +10,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 /// Seconds that a command has that nobody ends, or that was asked to end.
-const PATIENCE: Duration = Duration::from_secs(100);
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Bytes of address space that commands get which run out of it.
 const ADDRESSES: [u64; 2] = [120 << 20, 1400 << 20];

@@ -62,7 +62,7 @@ impl Kind for Kills {
     }
 
     fn limits(&self) -> Limits {
-        Limits { seconds: 400.0, bytes: 1 << 30 }
+        Limits { seconds: 1000.0, bytes: 1 << 30 }
     }
 
     fn trial(&self, trial: &Trial) -> Result<Outcome, Fault> {
