@@ -187,8 +187,8 @@ pub struct Desk<S> {
 }
 
 impl<S: State> Desk<S> {
-    /// Has the worker do `work`, and waits for it without holding Python's lock. What a person should know of a scene by
-    /// URL is a warning of Python's.
+    /// Has the worker do `work`, and waits for it without holding Python's lock. What a person should know of a scene
+    /// by URL is a warning of Python's.
     ///
     /// # Errors
     /// That of `work`; what a signal or `progress` raises: the job then ends as soon as it can.

@@ -2,8 +2,8 @@
 //! run them and what each kind promises.
 //!
 //! A trial ([`kind::Kind::trial`]) runs in a worker process ([`worker`]) that catches panics and counts memory. Who
-//! watches it ([`mod@slice`]) ends one that hangs and follows up one that dies. A [`campaign`] shares time out over kinds
-//! and keeps a [`tally`].
+//! watches it ([`mod@slice`]) ends one that hangs and follows up one that dies. A [`campaign`] shares time out over
+//! kinds and keeps a [`tally`].
 //!
 //! A new kind is a file in `inputs/` or `kills/` and a line in [`kinds`].
 #![cfg(unix)]
