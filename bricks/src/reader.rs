@@ -6,6 +6,7 @@ use crate::ending;
 use crate::error::{Error, Flaw, Part};
 use crate::layout::{DirectoryEntry, Header, MAGIC, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
 use crate::layout::{ENTRY_BYTES, MAX_DIRECTORY_BYTES, MAX_PAYLOAD_BYTES, MIN_DIRECTORY_BYTES, unread_kind};
+use crate::line::one_line;
 use crate::manifest::Manifest;
 use crate::pack;
 use crate::payload::Payload;
@@ -266,7 +267,7 @@ impl Reader<'_> {
         serde_json::from_slice(&json).map_err(|error| {
             self.invalid(Flaw {
                 part: Part::Section(Section::Manifest),
-                found: format!("text that does not parse ({error})"),
+                found: format!("text that does not parse ({})", one_line(&error.to_string())),
                 expected: "a manifest as JSON".to_owned(),
             })
         })

@@ -6,11 +6,12 @@
 
 use super::convert::{summarise, usage};
 use super::interrupt;
-use crate::cli::output::{is_quiet, one_line};
+use crate::cli::output::is_quiet;
 use crate::output::atomic;
 use crate::remote;
 use crate::settings::folder::{self, CACHE_VARIABLE};
 use anyhow::{Context, Result, bail};
+use bricks::one_line;
 use brickwalk_convert::build::{BuildError, BuildSettings, build_source};
 use brickwalk_convert::import::{EXTENSIONS, FileState, ImportSettings, Input, TILESET, import};
 use brickwalk_convert::progress::Progress;

@@ -2,12 +2,13 @@
 
 use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
 use super::{bake_displacement, interrupt};
-use crate::cli::output::{Usage, note, one_line, warn};
+use crate::cli::output::{Usage, note, warn};
 use crate::output::atomic;
 use crate::remote;
 use crate::settings::Adapter;
 use crate::settings::sizes::{counted, human_bytes, human_count};
 use anyhow::{Context, Result, bail, ensure};
+use bricks::one_line;
 use brickwalk_convert::build::{BuildError, BuildSettings, BuildSummary, build_source};
 use brickwalk_convert::import::{EXTENSIONS, ImportError, ImportSettings, Input, TILESET, import};
 use brickwalk_convert::progress::Progress;

@@ -32,10 +32,11 @@ pub mod walk;
 pub mod watcher;
 
 use crate::remote;
+use bricks::one_line;
 use clap::{CommandFactory, Parser};
 use options::args::{Cli, Command};
 use options::removed;
-use output::{ClosedPipe, Usage, one_line, print};
+use output::{ClosedPipe, Usage, print};
 use std::ffi::OsString;
 use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -3,6 +3,7 @@
 //! Results that a command exists for are always printed. Summaries and warnings are left out with `--quiet`, and events
 //! of the library, which say what it decides, are printed with `--verbose` alone.
 
+use bricks::one_line;
 use brickwalk_convert::progress::Progress;
 use clap::Args;
 use std::fmt::{Debug, Write as _};
@@ -97,14 +98,6 @@ pub fn warn(warnings: impl IntoIterator<Item = impl AsRef<str>>) {
     for warning in warnings {
         let _ = writeln!(std::io::stderr(), "brickwalk: warning: {}", one_line(warning.as_ref()));
     }
-}
-
-/// `text` with every run of control characters and white space as one space.
-pub fn one_line(text: &str) -> String {
-    text.split(|c: char| c.is_whitespace() || c.is_control())
-        .filter(|word| !word.is_empty())
-        .collect::<Vec<_>>()
-        .join(" ")
 }
 
 /// Prints events of this program on standard error, a line each.

@@ -1,5 +1,6 @@
 //! Reading of files of keyframes, which camera paths and motions are.
 
+use bricks::one_line;
 use bricks::planted::{self, Defect};
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,8 @@ pub struct KeyframesError {
 
 impl KeyframesError {
     pub(super) fn new(file: &Path, what: String) -> Self {
-        Self { file: file.into(), what }
+        // A name in the file may hold a line's end, and what is said of it quotes it.
+        Self { file: file.into(), what: one_line(&what) }
     }
 }
 

@@ -86,6 +86,15 @@ fn no_motion_leaves_matrices_as_they_are_and_turns_are_about_the_pivot() {
 }
 
 #[test]
+fn a_name_of_two_lines_is_refused_in_one() {
+    for (keyframe, of) in [(r#"{"tr\nslation": [1,0,0]}"#, "`tr slation`"), (r#"{"time": "1\r\n2"}"#, "\"1")] {
+        let text = format!(r#"{{"instances": [{{"node": "do\nor", "keyframes": [{keyframe}]}}]}}"#);
+        let error = parse(&text).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains(of) && !error.contains(char::is_control), "{error:?}");
+    }
+}
+
+#[test]
 fn poses_beyond_the_range_of_numbers_lie_on_lines() {
     let keys = r#"{"time": -1e308, "translation": [2, 8, -3]}, {"time": 1, "translation": [2, -1, 2.5]},
         {"time": 2, "translation": [7, 1e308, 0]}, {"time": 3, "translation": [7, -1e308, 0]}"#;

@@ -21,6 +21,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io::{BufRead, Write};
 use std::path::Path;
 
+use bricks::one_line;
 use serde::{Deserialize, Serialize};
 
 use super::item::{Item, Kind};
@@ -214,7 +215,7 @@ fn parse<T: serde::de::DeserializeOwned>(line: &[u8]) -> Result<T, String> {
     serde_json::from_slice(line).map_err(|error| {
         let text = error.to_string();
         let reason = text.split(" at line ").next().unwrap_or(&text);
-        format!("{reason} at column {}; is it what --requests-out wrote?", error.column())
+        format!("{} at column {}; is it what --requests-out wrote?", one_line(reason), error.column())
     })
 }
 
