@@ -56,6 +56,20 @@ defects! {
     PayloadEnd = "payload-end", "inputs/bricks";
     /// A triangle of a brick may name a vertex that is not there.
     BrickVertex = "brick-vertex", "inputs/bricks";
+    /// Payloads are not held against their checksums.
+    Checksum = "checksum", "faults/queries";
+    /// A map is read without asking how long the file still is.
+    MapLength = "map-length", "faults/files";
+    /// What a batch is about to use may be overwritten.
+    Pin = "unpinned-slot", "differences/schedules";
+    /// Queries take what lies before a ray's least distance.
+    LeastDistance = "least-distance", "differences/queries";
+    /// What a device refuses ends the process.
+    DeviceRefusal = "device-refusal", "device/limits";
+    /// Who waits for a wish is not told of it.
+    Unnotified = "lost-wake-up", "threads/inbox";
+    /// Room that was reserved in vain is never given back.
+    HeldBytes = "held-bytes", "threads/host-cache";
     /// A scene file is emptied before the new one is finished.
     OldOutput = "old-output", "kills/scene";
     /// What killed processes left is never removed.

@@ -2,6 +2,9 @@
 
 use super::wgsl::Pages;
 use crate::kernels::DeviceInfo;
+use bricks::one_line;
+use bricks::planted::{self, Defect};
+use std::sync::{Arc, Mutex, PoisonError};
 use thiserror::Error;
 
 /// Why there is no device to work with.
@@ -77,6 +80,8 @@ pub struct Gpu {
     pub upload: UploadPath,
     /// Bytes of the device's own memory, where the driver states them.
     pub local_memory: Option<u64>,
+    /// The first that the device said of what nobody waits for, and nobody asked about since.
+    complaint: Arc<Mutex<Option<String>>>,
 }
 
 /// Adapters of the given backends.
@@ -100,7 +105,7 @@ pub struct Candidate {
     adapter: Option<wgpu::Adapter>,
     /// Name, driver, backend.
     pub info: wgpu::AdapterInfo,
-    /// What it allows.
+    /// What it allows. A device is opened with these, which may be lowered before.
     pub limits: wgpu::Limits,
     /// What it lacks without which nothing works.
     pub flaw: Option<String>,
@@ -163,7 +168,7 @@ impl Candidate {
             .adapter
             .as_ref()
             .ok_or_else(|| DeviceError::NoAdapter { wanted: Some(self.info.name.clone()), found: "none".into() })?;
-        Gpu::from_adapter(adapter)
+        Gpu::from_adapter(adapter, &self.limits)
     }
 }
 
@@ -207,13 +212,31 @@ fn choose(candidates: Vec<Candidate>, wanted: Option<&str>) -> Result<Candidate,
 
 /// What limits are short of without which nothing works: its name, how much there is, how much is needed.
 fn missing(limits: &wgpu::Limits) -> Option<(&'static str, u64, u64)> {
-    let (found, needed) = (limits.max_storage_buffers_per_shader_stage, FIXED_STORAGE_BUFFERS + 4);
-    (found < needed).then(|| ("storage buffers a kernel", found.into(), needed.into()))
+    // What kernels have; all but the first is what WebGPU wants of every device.
+    let all = [
+        ("storage buffers a kernel", limits.max_storage_buffers_per_shader_stage, FIXED_STORAGE_BUFFERS + 4),
+        ("uniform buffers a kernel", limits.max_uniform_buffers_per_shader_stage, 2),
+        ("uniform buffers with offsets", limits.max_dynamic_uniform_buffers_per_pipeline_layout, 2),
+        ("groups of bindings", limits.max_bind_groups, 4),
+        ("invocations a workgroup", limits.max_compute_invocations_per_workgroup, 256),
+        ("invocations of a workgroup along x", limits.max_compute_workgroup_size_x, 256),
+        ("invocations of a workgroup along y", limits.max_compute_workgroup_size_y, 8),
+        ("invocations of a workgroup along z", limits.max_compute_workgroup_size_z, 1),
+        ("bytes that a workgroup shares", limits.max_compute_workgroup_storage_size, 16_384),
+        ("workgroups along an axis", limits.max_compute_workgroups_per_dimension, 65_535),
+    ];
+    let lacks = |&(_, found, needed): &(&str, u32, u32)| found < needed;
+    all.into_iter().find(lacks).map(|(what, found, needed)| (what, found.into(), needed.into()))
 }
 
 /// Whether an adapter's memory is the host's: integrated and software adapters.
 pub fn is_host_memory(info: &wgpu::AdapterInfo) -> bool {
     matches!(info.device_type, wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu)
+}
+
+/// Keeps the first complaint.
+fn note(complaint: &Mutex<Option<String>>, text: &str) {
+    complaint.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| one_line(text));
 }
 
 /// Bytes of the largest heap of an adapter's own memory; `None` where its backend does not tell.
@@ -245,9 +268,9 @@ impl Gpu {
         choose(candidates_by_name(), wanted)?.open()
     }
 
-    fn from_adapter(adapter: &wgpu::Adapter) -> Result<Self, DeviceError> {
+    fn from_adapter(adapter: &wgpu::Adapter, limits: &wgpu::Limits) -> Result<Self, DeviceError> {
         let info = adapter.get_info();
-        let limits = adapter.limits();
+        let limits = limits.clone();
         if let Some((what, found, needed)) = missing(&limits) {
             return Err(DeviceError::Limit { adapter: info.name, what, found, needed });
         }
@@ -262,11 +285,25 @@ impl Gpu {
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|e| DeviceError::NoDevice { adapter: info.name.clone(), reason: e.to_string() })?;
+        let complaint = Arc::<Mutex<Option<String>>>::default();
+        let (wrong, lost) = (complaint.clone(), complaint.clone());
+        // Instead of a panic wherever something was asked for last.
+        if !planted::is(Defect::DeviceRefusal) {
+            device.on_uncaptured_error(Arc::new(move |error| note(&wrong, &error.to_string())));
+        }
+        device.set_device_lost_callback(move |_, text| note(&lost, &format!("the device was lost: {text}")));
         let forced = std::env::var("BRICKWALK_UPLOAD").is_ok_and(|v| v == "staged");
         let mapped = is_host_memory(&info) && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) && !forced;
         let upload = if mapped { UploadPath::Mapped } else { UploadPath::Staged };
         let timestamps = features.contains(wgpu::Features::TIMESTAMP_QUERY);
-        Ok(Self { device, queue, info, limits, timestamps, upload, local_memory: local_memory(adapter) })
+        let local_memory = local_memory(adapter);
+        Ok(Self { device, queue, info, limits, timestamps, upload, local_memory, complaint })
+    }
+
+    /// What the device said since this was asked last, of what nobody waits for: it was lost, or something that it was
+    /// asked for was refused.
+    pub fn complaint(&self) -> Option<String> {
+        self.complaint.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// A buffer of so many bytes.
@@ -333,5 +370,7 @@ mod tests {
         let limits = |n| wgpu::Limits { max_storage_buffers_per_shader_stage: n, ..wgpu::Limits::default() };
         assert_eq!(missing(&limits(24)), None);
         assert_eq!(missing(&limits(16)), Some(("storage buffers a kernel", 16, 24)));
+        let narrow = wgpu::Limits { max_compute_invocations_per_workgroup: 64, ..limits(24) };
+        assert_eq!(missing(&narrow), Some(("invocations a workgroup", 64, 256)));
     }
 }

@@ -11,7 +11,7 @@ use super::kernels::Kernels;
 use super::lamps::LampBuffers;
 use super::pages::CachePages;
 use super::rays::{PixelBuffers, RayBuffers, TileBuffers, most_rays, storage};
-use super::readback::Readback;
+use super::readback::{Readback, check};
 use super::scene::SceneBuffers;
 use super::texels::Texels;
 use super::timing::Timing;
@@ -135,6 +135,7 @@ impl GpuExecutor {
         let whole = Readback::new(&gpu, 0);
         let groups = Groups::new(&gpu, &kernels, &buffers);
         let (view, directions) = (Params::default(), Directions::default());
+        check(&gpu)?;
         Ok(Self {
             gpu,
             scene,

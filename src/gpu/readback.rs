@@ -101,8 +101,16 @@ pub fn map(gpu: &Gpu, buffer: &wgpu::Buffer, mode: wgpu::MapMode) -> Result<(), 
         // The receiver outlives the poll below.
         let _ = send.send(result);
     });
-    gpu.device.poll(wgpu::PollType::wait_indefinitely()).map_err(device_error)?;
+    let done = gpu.device.poll(wgpu::PollType::wait_indefinitely());
+    // It says more than what became of the wait.
+    check(gpu)?;
+    done.map_err(device_error)?;
     receive.try_recv().map_err(device_error)?.map_err(device_error)
+}
+
+/// Whether the device refused something that nobody waited for.
+pub fn check(gpu: &Gpu) -> Result<(), ExecutorError> {
+    gpu.complaint().map_or(Ok(()), |text| Err(device_error(text)))
 }
 
 /// Puts the driver's words into an executor's error.

@@ -21,6 +21,7 @@ use crate::output::npy::Ray;
 use crate::scene::placement::affine;
 use crate::session::trace::Scaled;
 use bricks::Node;
+use bricks::planted::{self, Defect};
 use glam::{DMat3, DVec3};
 
 /// Of numbers of f32: more than a conversion rounds by.
@@ -183,7 +184,8 @@ impl Aim {
     pub(super) fn meet(&self, vertices: [DVec3; 3]) -> Option<Crossing> {
         let mut met = crossing_near(&self.line, self.reach, vertices)?;
         met.t = met.t.min(f64::MAX);
-        (self.t_min..=self.t_max).contains(&met.t).then_some(met)
+        let is_behind = met.t < self.t_min && !planted::is(Defect::LeastDistance);
+        (!is_behind && met.t <= self.t_max).then_some(met)
     }
 
     /// Whether what is entered at `from` may be met before `t`, which is in lengths of the given direction.

@@ -125,8 +125,21 @@ impl Opened {
                 bail!("{}: --requests-out needs a file in a folder that exists", file.display());
             }
         }
-        let device = Device::open(&settings.adapter)?;
-        let Bands { rows, room, why } = Bands::of(settings, &device, more::is_needed(scene.resident()))?;
+        Self::open_with(&Device::open(&settings.adapter)?, scene, path, settings, keep)
+    }
+
+    /// [`Opened::open_keeping`] on a device that is open.
+    ///
+    /// # Errors
+    /// As [`Opened::open`].
+    pub fn open_with(
+        device: &Device,
+        scene: Arc<SceneFile>,
+        path: &Path,
+        settings: &Settings,
+        keep: Keep,
+    ) -> Result<Self> {
+        let Bands { rows, room, why } = Bands::of(settings, device, more::is_needed(scene.resident()))?;
         let bytes = room.map_or(device.room(), |left| left.min(device.room()));
         let mut room = Room { page_bytes: device.page_bytes(), bytes, rows };
         let mut opened = loop {

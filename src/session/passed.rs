@@ -82,7 +82,8 @@ mod tests {
         };
         let pages =
             Pages { cache: 1, texels: 0, opacity: false, gloss: false, layers: false, levels: false, hides: false };
-        let other = Gpu { info: wgpu::AdapterInfo { driver_info: "newer".into(), ..gpu.info.clone() }, ..gpu.clone() };
+        let mut other = gpu.clone();
+        other.info.driver_info = "newer".into();
         let all = [
             mark(&gpu, pages, false),
             mark(&gpu, pages, true),

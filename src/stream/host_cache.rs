@@ -4,9 +4,10 @@
 //! worker still copies into or reads from is not evicted. A batch larger than the budget keeps its first items, so what
 //! is cached depends on the order of requests alone, never on which thread finished first.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
 use super::item::Item;
+use crate::stream::sync::{Arc, Mutex, MutexGuard};
+use bricks::planted::{self, Defect};
+use std::sync::PoisonError;
 
 /// What happened in a [`HostCache`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -172,7 +173,9 @@ impl Drop for Reservation {
         if !self.filled {
             let mut inner = self.cache.lock();
             inner.entries.pop(&self.item);
-            inner.stats.used_bytes -= self.bytes;
+            if !planted::is(Defect::HeldBytes) {
+                inner.stats.used_bytes -= self.bytes;
+            }
         }
     }
 }

@@ -23,6 +23,7 @@ mod ring;
 mod sizes;
 mod source;
 mod space;
+pub mod sync;
 mod trace;
 mod workers;
 

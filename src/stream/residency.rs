@@ -6,6 +6,7 @@ use super::ring::Ring;
 use super::sizes::Sizes;
 use super::space::Space;
 use crate::settings::Policy;
+use bricks::planted::{self, Defect};
 
 /// Alignment in bytes of sizes, offsets and the budget.
 const ALIGN: u64 = 16;
@@ -372,7 +373,7 @@ impl Residency {
             return Ok(Placed { slot, evicted: Vec::new() });
         }
         let bytes = self.bytes(item);
-        let is_pinned = |item: Item| self.is_pinned[item.index()];
+        let is_pinned = |item: Item| self.is_pinned[item.index()] && !planted::is(Defect::Pin);
         let start = match &mut self.placement {
             Placement::RoundRobin(ring) => ring.place(&self.space, bytes, is_pinned),
             Placement::Lru(lru) => lru.place(&self.space, bytes, is_pinned, |item| {

@@ -2,7 +2,7 @@
 //! reader reads them. `BRICKS_REGENERATE_GOLDEN=1` writes the file anew; do so only with a new format version.
 
 use crate::common::{Scene, written, written_with_fields, written_with_levels};
-use bricks::{SceneFile, verify_file};
+use bricks::{Access, SceneFile, verify_file};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -19,6 +19,25 @@ fn golden_file_with_displacement_fields() {
 #[test]
 fn golden_file_with_levels() {
     is_golden("version-4-levels.bricks", written_with_levels());
+}
+
+/// Files that earlier programs wrote.
+#[test]
+fn files_of_earlier_versions_are_refused_by_their_version() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
+    for version in 1..bricks::layout::VERSION {
+        let path = folder.join(format!("version-{version}.bricks"));
+        assert!(std::fs::metadata(&path).unwrap().len() > 10_000, "{}: a whole scene", path.display());
+        let says = |error: bricks::Error| {
+            let expected = format!("{}: the file has format version {version}", path.display());
+            let text = error.to_string();
+            assert!(text.starts_with(&expected) && text.ends_with("convert again"), "{text}");
+        };
+        for access in [Access::Map, Access::Read] {
+            says(SceneFile::open_with(&path, access).err().unwrap());
+        }
+        says(verify_file(&path, &mut |_, _| ()).err().unwrap());
+    }
 }
 
 fn is_golden(name: &str, (_folder, path, scene): (TempDir, PathBuf, Scene)) {

@@ -20,8 +20,10 @@ use tokio::sync::Notify;
 const EVERY: Duration = Duration::from_millis(16);
 /// A page that has not said within so long how large it is has the usual size.
 const HELLO: Duration = Duration::from_millis(500);
-/// A page that has not taken a picture for so long has gone.
+/// A page that has not taken a picture for so long has gone, and so has one that reads nothing of what it is told.
 const PATIENCE: Duration = Duration::from_secs(60);
+/// Most messages of a page in a second: far more than a hand can make.
+const MOST_MESSAGES: u32 = 1000;
 
 /// A session.
 struct Guest {
@@ -62,6 +64,7 @@ pub async fn receive(mut socket: WebSocket, options: &Options, converter: Conver
 
 async fn serve(socket: &mut WebSocket, guest: &mut Guest, news: &Notify, ends: &Notify) -> Result<()> {
     let mut first = Some(HELLO);
+    let (mut since, mut messages) = (Instant::now(), 0);
     loop {
         let every = first.take().unwrap_or(if guest.is_moving() { EVERY } else { PATIENCE });
         let mut told = None;
@@ -74,6 +77,13 @@ async fn serve(socket: &mut WebSocket, guest: &mut Guest, news: &Notify, ends: &
             () = tokio::time::sleep(every) => {}
             () = ends.notified() => return Ok(()),
         }
+        if since.elapsed() > Duration::from_secs(1) {
+            (since, messages) = (Instant::now(), 0);
+        }
+        messages += u32::from(told.is_some());
+        if messages > MOST_MESSAGES {
+            return Ok(());
+        }
         match told {
             Some(Message::Text(text)) => guest.tell(&text),
             Some(Message::Close(_)) => return Ok(()),
@@ -84,12 +94,17 @@ async fn serve(socket: &mut WebSocket, guest: &mut Guest, news: &Notify, ends: &
         }
         guest.advance();
         for answer in guest.news() {
-            socket.send(Message::Text(answer.to_string().into())).await?;
+            send(socket, Message::Text(answer.to_string().into())).await?;
         }
         if let Some(picture) = guest.picture()? {
-            socket.send(Message::Binary(picture.into())).await?;
+            send(socket, Message::Binary(picture.into())).await?;
         }
     }
+}
+
+/// Sends a message; one that the page does not read ends its session.
+async fn send(socket: &mut WebSocket, message: Message) -> Result<()> {
+    Ok(tokio::time::timeout(PATIENCE, socket.send(message)).await??)
 }
 
 impl Guest {

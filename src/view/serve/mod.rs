@@ -19,7 +19,7 @@ use anyhow::{Context, Result};
 use axum::Router;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::extract::{Query, State};
-use axum::http::{StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use serde::Deserialize;
@@ -129,10 +129,33 @@ async fn page(State(shared): State<Arc<Shared>>, Query(asked): Query<Asked>) -> 
     (headers, PAGE).into_response()
 }
 
+/// Whether a request comes from a page of this server. Browsers name the host that a page is from; what is no browser
+/// names none. A proxy may have another host, and hands the one that was asked for on.
+fn is_from_here(headers: &HeaderMap) -> bool {
+    let text = |name: &str| headers.get(name)?.to_str().ok();
+    if !headers.contains_key(header::ORIGIN) {
+        return true;
+    }
+    let origin = text("origin").and_then(|origin| Some(origin.split_once("://")?.1));
+    origin.is_some_and(|host| [text("host"), text("x-forwarded-host")].contains(&Some(host)))
+}
+
 /// A session, if there is one left.
-async fn session(State(shared): State<Arc<Shared>>, Query(asked): Query<Asked>, upgrade: WebSocketUpgrade) -> Response {
+async fn session(
+    State(shared): State<Arc<Shared>>,
+    Query(asked): Query<Asked>,
+    headers: HeaderMap,
+    upgrade: WebSocketUpgrade,
+) -> Response {
     if !shared.knows(&asked.token) {
         return refused();
+    }
+    if !is_from_here(&headers) {
+        return (
+            StatusCode::FORBIDDEN,
+            "this page is from another server; take the link that brickwalk serve printed\n",
+        )
+            .into_response();
     }
     let Ok(permit) = shared.sessions.clone().try_acquire_owned() else {
         let text = format!("all {} sessions are taken; close one, or serve with more --viewers", shared.options.most);

@@ -6,6 +6,8 @@
 
 mod boxes;
 mod inbox;
+#[cfg(test)]
+mod inbox_tests;
 mod inspect;
 mod overlay;
 mod pace;

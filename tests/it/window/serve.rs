@@ -7,6 +7,7 @@ use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
+use tungstenite::client::IntoClientRequest;
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Message, WebSocket, connect};
 
@@ -57,7 +58,16 @@ impl Server {
 
     /// A session, or the status that it is refused with.
     fn session(&self, token: &str) -> Result<Guest, u16> {
-        match connect(format!("ws://{}/session?token={token}", self.host)) {
+        self.session_with(token, &[])
+    }
+
+    /// The same with more headers.
+    fn session_with(&self, token: &str, headers: &[(&'static str, &str)]) -> Result<Guest, u16> {
+        let mut request = format!("ws://{}/session?token={token}", self.host).into_client_request().expect("a request");
+        for (name, value) in headers {
+            request.headers_mut().insert(*name, value.parse().expect("a value"));
+        }
+        match connect(request) {
             Ok((socket, _)) => {
                 if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
                     stream.set_read_timeout(Some(MOST)).expect("a timeout");
@@ -66,6 +76,18 @@ impl Server {
             }
             Err(tungstenite::Error::Http(answer)) => Err(answer.status().as_u16()),
             Err(error) => panic!("{error}"),
+        }
+    }
+
+    /// A session, once one is free.
+    fn wait_for_session(&self) -> Guest {
+        let start = Instant::now();
+        loop {
+            match self.session(&self.token) {
+                Ok(guest) => return guest,
+                Err(status) => assert!(status == 503 && start.elapsed() < MOST),
+            }
+            std::thread::sleep(Duration::from_millis(20));
         }
     }
 
@@ -230,8 +252,26 @@ fn nobody_comes_in_without_the_token_or_beyond_the_limit() {
         assert_eq!(server.status(&path), expected, "{path}");
     }
     assert_eq!(server.session("").err(), Some(401));
+    // Pages of other servers, even with the token.
+    let own = format!("http://{}", server.host);
+    for (headers, expected) in [
+        (vec![("origin", "http://example.org")], Some(403)),
+        (vec![("origin", "null")], Some(403)),
+        (vec![("origin", &own[..]), ("host", "example.org")], Some(403)),
+        (vec![("origin", &own[..])], None),
+        (vec![("origin", "https://example.org"), ("x-forwarded-host", "example.org")], None),
+    ] {
+        assert_eq!(server.session_with(&server.token, &headers).err(), expected, "{headers:?}");
+    }
     assert_eq!(server.status("/../etc/hostname"), 404);
-    let mut guests: Vec<Guest> = (0..2).map(|_| server.session(&server.token).expect("a session")).collect();
+    // More than a hand can tell ends a session.
+    let mut flood = server.wait_for_session();
+    let size = Message::text(json!({"do": "size", "width": 64, "height": 36}).to_string());
+    let start = Instant::now();
+    let sent = (0..100_000).take_while(|_| flood.socket.send(size.clone()).is_ok()).count();
+    assert!(sent < 100_000 || start.elapsed().as_secs() >= 100, "it may tell on and on");
+    drop(flood);
+    let mut guests: Vec<Guest> = (0..2).map(|_| server.wait_for_session()).collect();
     for guest in &mut guests {
         guest.until(is_done);
     }
@@ -248,16 +288,9 @@ fn nobody_comes_in_without_the_token_or_beyond_the_limit() {
     }
     // Whoever goes makes room, many times over, and nothing is left of them.
     drop(guests);
-    let start = Instant::now();
     let mut least = None;
     for number in 0..6 {
-        let mut guest = loop {
-            match server.session(&server.token) {
-                Ok(guest) => break guest,
-                Err(status) => assert!(status == 503 && start.elapsed() < MOST),
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        };
+        let mut guest = server.wait_for_session();
         guest.until(is_done);
         drop(guest);
         std::thread::sleep(Duration::from_millis(300));

@@ -1,12 +1,16 @@
 //! All kinds: a line each.
 
+use crate::device;
+use crate::differences;
+use crate::faults;
 use crate::inputs;
 use crate::kills::all as kills;
 use crate::kind::Kind;
 use crate::own;
+use crate::threads;
 
 /// All kinds, those that are fast first.
-pub static ALL: [&(dyn Kind + 'static); 35] = [
+pub static ALL: [&(dyn Kind + 'static); 46] = [
     &inputs::gltf::Glb,
     &inputs::gltf::Gltf,
     &inputs::compressed::Compressed,
@@ -29,6 +33,17 @@ pub static ALL: [&(dyn Kind + 'static); 35] = [
     &inputs::arrays::Arrays,
     &inputs::rates::RateFiles,
     &inputs::rows::RowFiles,
+    &differences::Builds,
+    &differences::Schedules,
+    &differences::Exact,
+    &differences::Asked,
+    &faults::Frames,
+    &faults::Queried,
+    &faults::Changed,
+    &device::Lowered,
+    &device::Lost,
+    &threads::Inboxes,
+    &threads::HostCaches,
     &kills::SCENE,
     &kills::SCENE_MEMORY,
     &kills::CONVERT,

@@ -5,12 +5,16 @@
 //! watches it ([`mod@slice`]) ends one that hangs and follows up one that dies. A [`campaign`] shares time out over
 //! kinds and keeps a [`tally`].
 //!
-//! A new kind is a file in `inputs/` or `kills/` and a line in [`kinds`].
+//! A new kind is a file beside those of its sort (`inputs/`, `kills/`, `faults/`, `differences/`, `device`, `threads/`) and a
+//! line in [`kinds`].
 #![cfg(unix)]
 
 pub mod board;
 pub mod campaign;
 pub mod command;
+pub mod device;
+pub mod differences;
+pub mod faults;
 pub mod inputs;
 pub mod kills;
 pub mod kind;
@@ -22,6 +26,9 @@ pub mod page;
 #[cfg(feature = "planted")]
 pub mod planted;
 pub mod random;
+pub mod scenes;
 pub mod slice;
+mod stream;
 pub mod tally;
+pub mod threads;
 pub mod worker;

@@ -10,6 +10,8 @@ pub(super) const EXPORT_AGAIN: &str = "export the file again";
 
 /// Most characters of a name or foreign message that a line repeats.
 const LINE_CHARS: usize = 200;
+/// Most characters of a path in a message: a file may name others by anything.
+const PATH_CHARS: usize = 500;
 
 /// Why an input could not be imported. The text is one line.
 #[derive(Debug, thiserror::Error)]
@@ -91,9 +93,12 @@ pub(super) fn one_line(text: &str) -> String {
     line
 }
 
-/// `path` as messages show it.
+/// `path` as messages show it: of one that is too long its end.
 pub(super) fn show(path: &Path) -> String {
-    path.to_string_lossy().chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+    let path = path.to_string_lossy();
+    let left_out = path.chars().count().saturating_sub(PATH_CHARS);
+    let rest = path.chars().skip(left_out).map(|c| if c.is_control() { '\u{fffd}' } else { c });
+    (left_out > 0).then_some('…').into_iter().chain(rest).collect()
 }
 
 #[cfg(test)]
@@ -107,5 +112,14 @@ mod tests {
         assert_eq!(long.chars().count(), LINE_CHARS + 1);
         assert!(long.ends_with('…'));
         assert_eq!(one_line(&"é".repeat(LINE_CHARS)).chars().count(), LINE_CHARS);
+    }
+
+    #[test]
+    fn a_path_is_bounded() {
+        assert_eq!(show(Path::new("a/b\n.png")), "a/b\u{fffd}.png");
+        let long = show(&Path::new(&"é".repeat(5000)).join("b.png"));
+        assert!(long.starts_with('…') && long.ends_with("é/b.png"), "{long}");
+        assert_eq!(long.chars().count(), PATH_CHARS + 1);
+        assert_eq!(show(Path::new(&"é".repeat(PATH_CHARS))).chars().count(), PATH_CHARS);
     }
 }

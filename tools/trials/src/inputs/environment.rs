@@ -44,7 +44,12 @@ fn hdr(random: &mut Random, harm: Harm) -> Vec<u8> {
     let mut rows = Vec::new();
     for _ in 0..height {
         if width < 8 || random.chance(40) {
-            rows.extend((0..4 * width).map(|at| if at % 4 == 3 { 129 } else { random.word() as u8 & 0x7f }));
+            // The largest of the three has its first bit: what has not begins a run.
+            rows.extend((0..4 * width).map(|at| match at % 4 {
+                3 => 129,
+                0 => random.word() as u8 | 0x80,
+                _ => random.word() as u8 & 0x7f,
+            }));
             continue;
         }
         rows.extend([2, 2, 0, width as u8]);

@@ -26,6 +26,43 @@ fn inputs_are_read_or_refused() {
     }
 }
 
+/// Trials of all kinds that begin so; at least so many of each pass, and are stopped.
+fn all(begin: &str, count: u64, least: [u64; 2]) {
+    let output = run(&format!("--only {begin} --seed 0 --count {count} --minutes 30"), &[]);
+    let text = said(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    for kind in kinds::ALL.iter().filter(|kind| kind.name().starts_with(begin)) {
+        if let Some(why) = kind.lacks() {
+            skip(&why);
+            continue;
+        }
+        let [trials, passed, stopped, _] = counts(&text, kind.name());
+        let name = kind.name();
+        assert!(trials == count && passed >= least[0] && stopped >= least[1], "{name}: {passed} {stopped}");
+    }
+}
+
+#[test]
+fn faults_end_in_right_answers_or_one_line() {
+    all("faults/", 40, [8, 5]);
+}
+
+#[test]
+fn what_changes_nothing_makes_no_difference() {
+    all("differences/", 12, [12, 0]);
+}
+
+#[test]
+fn lesser_devices_give_the_same_or_say_why() {
+    all("device/limits", 8, [2, 2]);
+    all("device/lost", 8, [0, 8]);
+}
+
+#[test]
+fn orders_of_threads_do_not_show() {
+    all("threads/", 100, [100, 0]);
+}
+
 /// The files that trials of a kind make.
 fn made(kind: &str, seed: u64) -> BTreeMap<PathBuf, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
