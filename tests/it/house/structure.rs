@@ -175,3 +175,24 @@ fn files_that_comments_and_pages_name_are_there() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
     assert_eq!(named_files("as in `src/gone.rs`, (shaders/a.wgsl)."), ["src/gone.rs", "shaders/a.wgsl"]);
 }
+
+#[test]
+fn what_is_unsafe_stands_in_the_page_on_security() {
+    let page = read(&root().join("SECURITY.md"));
+    let (_, table) = page.split_once("## `unsafe`").expect("a section on it");
+    let rows = table.lines().skip_while(|line| !line.starts_with("| `")).take_while(|line| line.starts_with("| `"));
+    let places: Vec<&str> = rows.flat_map(|row| row.split('|').nth(1).unwrap().split('`').skip(1).step_by(2)).collect();
+    let words = ["unsafe {", "unsafe impl", "unsafe fn", "unsafe extern"];
+    let is_unsafe = |line: &str| !line.trim_start().starts_with("//") && words.iter().any(|word| line.contains(word));
+    let mut used = BTreeSet::new();
+    for folder in CRATES {
+        for file in files(&root().join(folder), ".rs") {
+            let path = format!("{folder}/{file}");
+            if !path.contains("tests") && read(&root().join(&path)).lines().any(is_unsafe) {
+                let place = places.iter().find(|place| path.starts_with(**place));
+                used.insert(*place.unwrap_or_else(|| panic!("{path} has `unsafe` and is not in SECURITY.md")));
+            }
+        }
+    }
+    assert_eq!(used, places.into_iter().collect(), "each place of the table has some");
+}
