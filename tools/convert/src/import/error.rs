@@ -93,12 +93,14 @@ pub(super) fn one_line(text: &str) -> String {
     line
 }
 
-/// `path` as messages show it: of one that is too long its end.
+/// `path` as messages show it: of one that is too long its beginning and its end.
 pub(super) fn show(path: &Path) -> String {
-    let path = path.to_string_lossy();
-    let left_out = path.chars().count().saturating_sub(PATH_CHARS);
-    let rest = path.chars().skip(left_out).map(|c| if c.is_control() { '\u{fffd}' } else { c });
-    (left_out > 0).then_some('…').into_iter().chain(rest).collect()
+    let shown = |c: char| if c.is_control() { '\u{fffd}' } else { c };
+    let path: Vec<char> = path.to_string_lossy().chars().map(shown).collect();
+    match path.len() > PATH_CHARS {
+        true => path[..PATH_CHARS / 2].iter().chain(&['…']).chain(&path[path.len() - PATH_CHARS / 2..]).collect(),
+        false => path.into_iter().collect(),
+    }
 }
 
 #[cfg(test)]
@@ -117,8 +119,8 @@ mod tests {
     #[test]
     fn a_path_is_bounded() {
         assert_eq!(show(Path::new("a/b\n.png")), "a/b\u{fffd}.png");
-        let long = show(&Path::new(&"é".repeat(5000)).join("b.png"));
-        assert!(long.starts_with('…') && long.ends_with("é/b.png"), "{long}");
+        let long = show(&Path::new("folder").join("é".repeat(5000)).join("b.png"));
+        assert!(long.starts_with("folder/é") && long.contains("é…é") && long.ends_with("é/b.png"), "{long}");
         assert_eq!(long.chars().count(), PATH_CHARS + 1);
         assert_eq!(show(Path::new(&"é".repeat(PATH_CHARS))).chars().count(), PATH_CHARS);
     }
