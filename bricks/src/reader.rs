@@ -3,10 +3,9 @@
 use crate::attributes;
 use crate::displacement::DisplacementField;
 use crate::ending;
-use crate::error::{Error, Flaw, Part};
+use crate::error::{Error, Flaw, Part, one_line};
 use crate::layout::{DirectoryEntry, Header, MAGIC, PAGE_BYTES, SECTION_ALIGN, Section, VERSION};
 use crate::layout::{ENTRY_BYTES, MAX_DIRECTORY_BYTES, MAX_PAYLOAD_BYTES, MIN_DIRECTORY_BYTES, unread_kind};
-use crate::line::one_line;
 use crate::manifest::Manifest;
 use crate::pack;
 use crate::payload::Payload;

@@ -291,7 +291,9 @@ impl Gpu {
         if !planted::is(Defect::DeviceRefusal) {
             device.on_uncaptured_error(Arc::new(move |error| note(&wrong, &error.to_string())));
         }
-        device.set_device_lost_callback(move |_, text| note(&lost, &format!("the device was lost: {text}")));
+        device.set_device_lost_callback(move |_, text| {
+            note(&lost, &format!("the driver lost it ({text}); start again, or render with --adapter cpu"));
+        });
         let forced = std::env::var("BRICKWALK_UPLOAD").is_ok_and(|v| v == "staged");
         let mapped = is_host_memory(&info) && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) && !forced;
         let upload = if mapped { UploadPath::Mapped } else { UploadPath::Staged };

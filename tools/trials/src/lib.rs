@@ -5,8 +5,8 @@
 //! watches it ([`mod@slice`]) ends one that hangs and follows up one that dies. A [`campaign`] shares time out over
 //! kinds and keeps a [`tally`].
 //!
-//! A new kind is a file beside those of its sort (`inputs/`, `kills/`, `faults/`, `differences/`, `device`, `threads/`) and a
-//! line in [`kinds`].
+//! A new kind is a file beside those of its sort (`inputs/`, `kills/`, `faults/`, `differences/`, `device`, `threads/`)
+//! and a line in [`kinds`].
 #![cfg(unix)]
 
 pub mod board;
