@@ -133,6 +133,7 @@ fn run(words: &Words) -> Result<ExitCode> {
         ensure!(words.count == Some(1) && kinds.len() == 1, "--keep: give --only KIND --seed N --count 1");
         atomic::create_folder(keep)?;
     }
+    let kinds = able(kinds, words.only.is_empty())?;
     let jobs = words.jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from));
     let how = How { program: program(words)?, keep: words.keep.clone(), plant: None };
     let plan = Plan { kinds, seconds: words.minutes * 60.0, count: words.count, seed: words.seed, jobs, how };
@@ -167,7 +168,7 @@ fn tell(finding: &Finding) {
     say(&format!("{}: {}\n    {text}\n    {}\n", finding.kind, finding.what, finding.command));
 }
 
-/// The kinds whose names begin as one of `only`, and that can run here; all without any.
+/// The kinds whose names begin as one of `only`; all without any.
 fn chosen(only: &[String]) -> Result<Vec<&'static dyn Kind>> {
     let begins = |name: &str, only: &str| name.starts_with(only) && kinds::find(only).is_none();
     let is_chosen = |name: &str| only.is_empty() || only.iter().any(|only| begins(name, only));
@@ -177,10 +178,15 @@ fn chosen(only: &[String]) -> Result<Vec<&'static dyn Kind>> {
     let others = kinds::ALL.iter().filter(|kind| !exact(kind.name()) && is_chosen(kind.name()));
     all.extend(others.copied());
     ensure!(!all.is_empty(), "--only {}: there is no such kind; see --list", only.join(" --only "));
+    Ok(all)
+}
+
+/// Those of `kinds` that can run here; where `are_all` are meant, the others are named.
+fn able(kinds: Vec<&'static dyn Kind>, are_all: bool) -> Result<Vec<&'static dyn Kind>> {
     let mut able = Vec::new();
-    for kind in all {
+    for kind in kinds {
         match kind.lacks() {
-            Some(why) if only.is_empty() => eprintln!("brickwalk-trials: {} is left out: {why}", kind.name()),
+            Some(why) if are_all => eprintln!("brickwalk-trials: {} is left out: {why}", kind.name()),
             Some(why) => bail!("{}: {why}", kind.name()),
             None => able.push(kind),
         }

@@ -78,6 +78,9 @@ pub const NAMES: &[&str] = &[
     "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_emissive_strength",
     "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_materials_iridescence",
+    "KHR_materials_anisotropy",
     "asset",
     "version",
     "2.0",
@@ -107,6 +110,60 @@ pub struct Asset {
     pub root: Value,
     /// The buffer.
     pub binary: Vec<u8>,
+}
+
+/// An extension of a material: its name, and what it says.
+fn extension(random: &mut Random, is_textured: bool) -> (&'static str, Value) {
+    let (name, mut value, textures): (_, _, &[&str]) = match random.below(11) {
+        0 => ("KHR_materials_ior", json!({"ior": random.pick([0.0, 0.5, 1.0, 1.5, 9.0])}), &[]),
+        1 => ("KHR_materials_emissive_strength", json!({"emissiveStrength": 4}), &[]),
+        2 => ("KHR_materials_transmission", json!({"transmissionFactor": 0.5}), &["transmissionTexture"]),
+        3 => (
+            "KHR_materials_specular",
+            json!({"specularFactor": 0.5, "specularColorFactor": [1, 0.5, 2]}),
+            &["specularTexture", "specularColorTexture"],
+        ),
+        4 => (
+            "KHR_materials_clearcoat",
+            json!({"clearcoatFactor": 1, "clearcoatRoughnessFactor": 0.25}),
+            &["clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"],
+        ),
+        5 => (
+            "KHR_materials_pbrSpecularGlossiness",
+            json!({"glossinessFactor": 0.5, "specularFactor": [1, 0, 0.5], "diffuseFactor": [1, 0.5, 0.25, 1]}),
+            &["diffuseTexture", "specularGlossinessTexture"],
+        ),
+        6 => (
+            "KHR_materials_volume",
+            json!({"thicknessFactor": random.pick([0.0, 0.5]), "attenuationDistance": 2,
+                "attenuationColor": [1, 0.5, 0.25]}),
+            &["thicknessTexture"],
+        ),
+        7 => (
+            "KHR_materials_sheen",
+            json!({"sheenColorFactor": [1, 0.5, 0], "sheenRoughnessFactor": 0.5}),
+            &["sheenColorTexture", "sheenRoughnessTexture"],
+        ),
+        8 => (
+            "KHR_materials_anisotropy",
+            json!({"anisotropyStrength": 0.5, "anisotropyRotation": random.pick([0.0, 1.0, 1e300])}),
+            &["anisotropyTexture"],
+        ),
+        9 => (
+            "KHR_materials_iridescence",
+            json!({"iridescenceFactor": 1, "iridescenceIor": 1.3, "iridescenceThicknessMinimum": 100}),
+            &["iridescenceTexture", "iridescenceThicknessTexture"],
+        ),
+        _ => ("KHR_materials_unlit", json!({}), &[]),
+    };
+    if is_textured {
+        for texture in textures {
+            if random.chance(50) {
+                value[*texture] = json!({"index": 0, "texCoord": random.pick([0, 0, 0, 1, 2])});
+            }
+        }
+    }
+    (name, value)
 }
 
 impl Asset {
@@ -210,25 +267,19 @@ impl Asset {
             }
             let slot = random.pick(["normalTexture", "emissiveTexture", "occlusionTexture"]);
             material[slot] = texture.clone();
+            material["emissiveFactor"] = json!([1, 0.5, 0.25]);
+            if slot == "normalTexture" {
+                material[slot]["scale"] = json!(random.pick([1.0, 0.5, -1.0, 1e30]));
+            }
+            if random.chance(30) {
+                material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = texture.clone();
+            }
             material["pbrMetallicRoughness"]["baseColorTexture"] = texture;
         }
-        if random.chance(30) {
-            let extension = random.pick([
-                "KHR_materials_ior",
-                "KHR_materials_emissive_strength",
-                "KHR_materials_transmission",
-                "KHR_materials_specular",
-                "KHR_materials_clearcoat",
-                "KHR_materials_pbrSpecularGlossiness",
-                "KHR_materials_volume",
-                "KHR_materials_sheen",
-                "KHR_materials_unlit",
-            ]);
-            material["extensions"][extension] = json!({"ior": 1.5, "emissiveStrength": 4, "transmissionFactor": 0.5,
-                "specularFactor": 0.5, "clearcoatFactor": 1});
-            if extension == "KHR_materials_pbrSpecularGlossiness" {
-                material["extensions"][extension] = json!({"glossinessFactor": 0.5, "specularFactor": [1, 0, 0.5]});
-            }
+        let is_textured = !self.root["textures"].is_null();
+        for _ in 0..random.pick([0, 0, 1, 1, 2, 4]) {
+            let (name, extension) = extension(random, is_textured);
+            material["extensions"][name] = extension;
         }
         self.push("materials", material);
     }
@@ -244,6 +295,9 @@ impl Asset {
             let translation = self.floats("VEC3", &[1.0; 6], 3);
             let instances = json!({"attributes": {"TRANSLATION": translation}});
             self.root["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"] = instances;
+        }
+        if random.chance(10) {
+            self.root["scenes"] = json!([{"nodes": [0], "name": "first"}, {"nodes": [0, 0]}]);
         }
         if random.chance(20) {
             let light = json!({"type": random.pick(["point", "spot", "directional"]), "intensity": 3});

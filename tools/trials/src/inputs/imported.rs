@@ -3,8 +3,8 @@
 use super::{Files, Verdict, bricks_file};
 use crate::kind::Fault;
 use crate::random::Random;
-use brickwalk_convert::build::{BuildSettings, build};
-use brickwalk_convert::import::{ImportSettings, Input, Up, import, load_all};
+use brickwalk_convert::build::{BuildSettings, build, build_source};
+use brickwalk_convert::import::{ImportSettings, Imported, Input, Up, import, load_all};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
 use std::path::Path;
@@ -24,7 +24,8 @@ const MOST_BUILT: u64 = 4096;
 /// The scene breaks a promise.
 pub fn read(random: &mut Random, files: &Files, folder: &Path, a_byte: u64) -> Result<Verdict, Fault> {
     let path = files.write(folder)?;
-    let settings = ImportSettings { scratch: Some(folder.into()), ..ImportSettings::default() };
+    let movable = if random.chance(10) { vec!["a*".to_owned()] } else { Vec::new() };
+    let settings = ImportSettings { scratch: Some(folder.into()), movable, ..ImportSettings::default() };
     let up = random.pick([None, None, Some(Up::Y), Some(Up::Z)]);
     let input = Input { up, ..Input::from(path) };
     let opened = match import(&[input], &settings, &Progress::hidden()) {
@@ -38,7 +39,7 @@ pub fn read(random: &mut Random, files: &Files, folder: &Path, a_byte: u64) -> R
     judge(&scene, files.length(), a_byte)?;
     let triangles: u64 = scene.placements.iter().map(|p| scene.meshes[p.mesh as usize].triangle_count()).sum();
     if triangles <= MOST_BUILT && random.chance(BUILT) {
-        return built(random, scene, folder, files.name());
+        return built(random, &opened, scene, folder, files.name());
     }
     Ok(Verdict::Read)
 }
@@ -81,8 +82,14 @@ fn judge(scene: &SourceScene, bytes: u64, a_byte: u64) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Builds a scene file of a scene, and reads all of that.
-fn built(random: &mut Random, scene: SourceScene, folder: &Path, name: &str) -> Result<Verdict, Fault> {
+/// Builds a scene file of what was imported, as it was opened or loaded, and reads all of that.
+fn built(
+    random: &mut Random,
+    opened: &Imported,
+    scene: SourceScene,
+    folder: &Path,
+    name: &str,
+) -> Result<Verdict, Fault> {
     let output = folder.join("built.bricks");
     let settings = BuildSettings {
         brick_triangles: random.pick([4, 64, 16384]),
@@ -92,7 +99,12 @@ fn built(random: &mut Random, scene: SourceScene, folder: &Path, name: &str) -> 
         lod: random.chance(30),
         ..BuildSettings::default()
     };
-    if let Err(error) = build(scene, &settings, &output, &Progress::hidden()) {
+    let progress = Progress::hidden();
+    let made = match random.chance(50) {
+        true => build_source(opened, &settings, &output, &progress),
+        false => build(scene, &settings, &output, &progress),
+    };
+    if let Err(error) = made {
         // What cannot be built names a place in the scene; the command names the file.
         return Ok(Verdict::Refused(format!("{name}: {error}")));
     }

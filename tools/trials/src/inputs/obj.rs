@@ -52,6 +52,14 @@ impl Format for Obj {
         let mut materials = b"newmtl red\nKd 1 0 0\nPr 0.25\nPm 0.5\nNs 10\nmap_Kd -clamp on b.png\nnewmtl glass\n\
             Kd 0.5\nd 0.25\nKe 1 2 3\nmap_Bump -bm 0.5 b.png\nmap_d b.png\n"
             .to_vec();
+        if random.chance(30) {
+            materials.extend(random.pick([
+                b"map_Pr b.png\nmap_Pm b.png\n".as_slice(),
+                b"map_Pm -clamp on b.png\n",
+                b"map_Ke b.png\nnorm b.png\n",
+                b"map_Pr c.png\nmap_Ks b.png\n",
+            ]));
+        }
         let mut text = text.into_bytes();
         harm.words(random, &mut text, NAMES, 70);
         harm.bytes(random, &mut text, 30);
