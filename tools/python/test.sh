@@ -31,7 +31,7 @@ cp "$root/LICENSE-MIT" "$root/LICENSE-APACHE" "$package/"
 export CARGO_PROFILE_RELEASE_DEBUG=false
 wheels=$target/python/wheels
 rm -rf "$wheels"
-"$environment/bin/maturin" build --release --locked --interpreter "$environment/bin/python" \
+"$environment/bin/maturin" build --release --locked --features shared --interpreter "$environment/bin/python" \
     --manifest-path "$root/tools/python/Cargo.toml" --target-dir "$target" --out "$wheels"
 wheel=$(echo "$wheels"/*.whl)
 bytes=$(wc -c <"$wheel")

@@ -22,16 +22,24 @@ use axum::extract::{Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
 use serde::Deserialize;
 use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::sync::{Notify, Semaphore};
 
 const PAGE: &str = include_str!("page.html");
 /// Most bytes of what a page tells at once.
 const MOST_BYTES: usize = 1 << 16;
+/// Most connections at a time that are no sessions; more wait.
+const MOST_CONNECTIONS: usize = 128;
+/// A connection that has not asked for anything within so long ends.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// What is served.
 pub struct Options {
@@ -99,14 +107,40 @@ pub fn run(options: Options, converter: Converter, ready: impl FnOnce(&str) -> R
             IpAddr::V6(address) => format!("[{address}]"),
         };
         ready(&format!("http://{host}:{port}/?token={}", shared.token))?;
-        let ends = shared.ends.clone();
-        let until = async move {
+        tokio::select! {
+            () = accept(&listener, router(shared.clone())) => {}
             // Without a handler the process ends at once, which is as good.
-            let _ = tokio::signal::ctrl_c().await;
-            ends.notify_waiters();
-        };
-        axum::serve(listener, router(shared)).with_graceful_shutdown(until).await.context("the server")
+            _ = tokio::signal::ctrl_c() => {}
+        }
+        // Sessions end with the picture that they are at; those that wait for their page are cut off.
+        shared.ends.notify_waiters();
+        let most = u32::try_from(shared.options.most)?;
+        let _ = tokio::time::timeout(Duration::from_secs(1), shared.sessions.acquire_many(most)).await;
+        Ok(())
     })
+}
+
+/// Answers whoever connects, for ever.
+async fn accept(listener: &TcpListener, router: Router) {
+    let connections = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    while let Ok(permit) = connections.clone().acquire_owned().await {
+        let stream = match listener.accept().await {
+            Ok((stream, _)) => stream,
+            Err(_) => {
+                // Who went away while it waited, or too many open files, which others close.
+                tokio::time::sleep(Duration::from_millis(50)).await;
+                continue;
+            }
+        };
+        let service = TowerToHyperService::new(router.clone());
+        tokio::spawn(async move {
+            let mut server = http1::Builder::new();
+            server.timer(TokioTimer::new()).header_read_timeout(PATIENCE);
+            // What goes wrong here concerns nobody but the other end. It is over once it becomes a session.
+            let _ = server.serve_connection(TokioIo::new(stream), service).with_upgrades().await;
+            drop(permit);
+        });
+    }
 }
 
 fn router(shared: Arc<Shared>) -> Router {
