@@ -2,7 +2,7 @@
 
 use bricks::layout::{DirectoryEntry, ENTRY_BYTES, Header, MAX_DIRECTORY_BYTES, MIN_DIRECTORY_BYTES, PAGE_BYTES};
 use bricks::{
-    BRICK_INDEX32, Brick, DISPLACEMENT_HITS, DisplacementField, GeometryLayout, Level, MAX_BRICK_HEIGHT, Node,
+    BRICK_INDEX32, Brick, Corners, DISPLACEMENT_HITS, DisplacementField, GeometryLayout, Level, MAX_BRICK_HEIGHT, Node,
     OCCUPANCY_LEVELS, OccupancyMap, OpacityMap, Payload, Resident, SceneFile, Section, Span, Texture, pack, validate,
 };
 use bytemuck::Pod;
@@ -36,14 +36,70 @@ pub fn exercise(bytes: &[u8]) -> (bool, usize) {
         if file.copy(payload, &mut out).is_ok() {
             copied += 1;
             traverse(file.resident(), payload, &out);
+            again(&file, payload, &out);
         }
     }
+    requests(&file);
+    placed(&file);
     let report = file.verify(&mut |_, _| {}).expect("bytes in memory can be read");
     for problem in &report.problems {
         assert!(problem.part().is_some() && !problem.to_string().contains('\n'));
     }
     assert!(!report.is_ok() || copied == file.resident().payloads().count(), "verify finds what copying finds");
     (true, copied)
+}
+
+/// What was copied comes by other ways, too.
+fn again(file: &SceneFile, payload: Payload, bytes: &[u8]) {
+    let span = file.resident().span(payload).expect("what was copied has a place");
+    file.copy_stored(payload, &mut vec![0; span.bytes as usize]).expect("what was copied is stored");
+    match payload {
+        Payload::Proxies(brick) => drop(file.occupancy(brick).expect("what was copied is a map")),
+        Payload::Displacement(field) => assert_eq!(file.displacement(field).expect("what was copied"), bytes),
+        _ => {}
+    }
+}
+
+/// What is not there is refused, and so is room of another size.
+fn requests(file: &SceneFile) {
+    let none = u32::MAX - 1;
+    let absent = [
+        Payload::Geometry(none),
+        Payload::Attributes(none),
+        Payload::Proxies(none),
+        Payload::Texture(none),
+        Payload::Opacity(none),
+        Payload::Tile(none),
+        Payload::Displacement(none),
+    ];
+    let all: Vec<Payload> = file.resident().payloads().map(|(payload, _)| payload).collect();
+    let first = all.first().copied();
+    let parts: usize = file.in_parts(&all).map(<[Payload]>::len).sum();
+    assert_eq!(parts, all.len(), "parts are all");
+    let room = first.map_or(0, |payload| file.loaded_bytes(payload) as usize + 1);
+    let wrong = first.map(|payload| file.copy(payload, &mut vec![0; room]));
+    let absent = absent.into_iter().map(|payload| file.copy_stored(payload, &mut []));
+    for answer in absent.chain(wrong).chain([file.occupancy(none).map(drop), file.displacement(none).map(drop)]) {
+        let message = answer.expect_err("what is not there is refused").to_string();
+        assert!(message.contains("fuzzed.bricks") && !message.contains('\n'), "{message}");
+    }
+}
+
+/// Instances may be placed anew where they are, or farther on, in a scene of its own.
+fn placed(file: &SceneFile) {
+    let instances = &file.resident().instances;
+    let places: Vec<(u32, [f64; 12])> =
+        (1..).zip(instances.iter().skip(1)).map(|(at, instance)| (at, instance.world_from_object)).collect();
+    let Some(&(_, mut farther)) = places.first() else { return };
+    let mut other = file.duplicate();
+    farther[3] += 1.0;
+    let moved = other.place(&places).and_then(|()| other.place(&[(1, farther)]));
+    if moved.is_ok() {
+        validate::resident(other.resident()).expect("what is placed is valid");
+    }
+    assert!(other.place(&[(0, farther)]).is_err() && other.place(&[(u32::MAX, farther)]).is_err());
+    assert!(other.place(&[(1, [0.0; 12])]).is_err() && other.place(&[(1, [f64::NAN; 12])]).is_err());
+    assert_eq!(&file.resident().instances, instances, "the first stays");
 }
 
 /// Has levels be bricks: every leaf has at most one that stands for it, and none stands for itself in the end.
@@ -126,6 +182,9 @@ pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
         }
     }
     assert_eq!(visits, brick.node_count);
+    let corners = Corners::new(&brick, bytes);
+    let places = (0..brick.triangle_count).flat_map(|triangle| corners.of(triangle)).flatten();
+    assert!(places.into_iter().all(f64::is_finite), "vertices are finite");
 }
 
 /// Makes every checksum right that can be found in `bytes`, so that the checks behind them are reached. What leads out

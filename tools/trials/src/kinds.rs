@@ -10,10 +10,11 @@ use crate::own;
 use crate::threads;
 
 /// All kinds, those that are fast first.
-pub static ALL: [&(dyn Kind + 'static); 46] = [
+pub static ALL: [&(dyn Kind + 'static); 47] = [
     &inputs::gltf::Glb,
     &inputs::gltf::Gltf,
     &inputs::compressed::Compressed,
+    &inputs::draco::Draco,
     &inputs::samples::Samples,
     &inputs::tiles::Tiles,
     &inputs::obj::Obj,

@@ -5,6 +5,7 @@ use crate::kind::Fault;
 use crate::mutate::{Harm, bytes};
 use crate::random::Random;
 use bricks::layout::Header;
+use bricks::{Access, Error, SceneFile, VerifyReport, verify_file};
 use brickwalk_convert::build::{BuildSettings, TextureEncoding, build};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Primitive, SourceTexture};
@@ -69,6 +70,29 @@ fn resident(file: &[u8]) -> usize {
     header.map_or(0, |header| header.directory_offset as usize).min(file.len())
 }
 
+/// However a file is opened, it opens or does not, and has as many problems.
+fn by_path(files: &Files, folder: &Path) -> Result<(), Fault> {
+    let path = files.write(folder)?;
+    let opened = [
+        SceneFile::from_bytes("fuzzed.bricks", files.bytes().to_vec()),
+        SceneFile::open(&path),
+        SceneFile::open_with(&path, Access::Map),
+        SceneFile::open_with(&path, Access::Read),
+    ];
+    let checksums = opened.each_ref().map(|file| file.as_ref().ok().map(SceneFile::checksum));
+    if checksums.iter().any(|checksum| *checksum != checksums[0]) {
+        return Err(Fault::new("a file opens by one way and not by another", format!("{checksums:?}")));
+    }
+    let problems = |report: Result<VerifyReport, Error>| report.ok().map(|report| report.problems.len());
+    let whole = problems(verify_file(&path, &mut |_, _| {}));
+    for file in opened.iter().flatten() {
+        if problems(file.verify(&mut |_, _| {})) != whole {
+            return Err(Fault::new("a file has other problems by another way", format!("{whole:?}")));
+        }
+    }
+    Ok(())
+}
+
 impl Format for BricksFile {
     const NAME: &'static str = "inputs/bricks";
     const ABOUT: &'static str =
@@ -119,7 +143,10 @@ impl Format for BricksFile {
         Files::one("fuzzed.bricks", file)
     }
 
-    fn read(&self, _: &mut Random, files: &Files, _: &Path) -> Result<Verdict, Fault> {
+    fn read(&self, random: &mut Random, files: &Files, folder: &Path) -> Result<Verdict, Fault> {
+        if random.chance(2) {
+            by_path(files, folder)?;
+        }
         // It insists by panics.
         match exercise::exercise(files.bytes()) {
             (true, _) => Ok(Verdict::Read),

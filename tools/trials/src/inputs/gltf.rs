@@ -1,6 +1,6 @@
 //! glTF: JSON with a buffer beside it or within it, and GLB.
 
-use super::{Files, Format, Verdict, harmed_image, imported, le16, le32};
+use super::{Files, Format, Verdict, harmed_image, imported, ktx2, le16, le32};
 use crate::kind::Fault;
 use crate::mutate::{Harm, chunks};
 use crate::random::Random;
@@ -260,6 +260,12 @@ impl Asset {
             self.push("images", json!({"bufferView": image, "mimeType": mime}));
             self.push("samplers", json!({"wrapS": 33071, "wrapT": 33648}));
             self.push("textures", json!({"source": 0, "sampler": 0}));
+            if random.chance(20) {
+                let bytes = ktx2(random, harm);
+                let image = self.view(&bytes);
+                let image = self.push("images", json!({"bufferView": image, "mimeType": "image/ktx2"}));
+                self.root["textures"][0]["extensions"]["KHR_texture_basisu"] = json!({"source": image});
+            }
             let mut texture = json!({"index": 0});
             if random.chance(30) {
                 texture["extensions"]["KHR_texture_transform"] = json!({"offset": [0.5, 1], "rotation": 1, "scale": 2});

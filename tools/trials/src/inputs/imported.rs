@@ -28,6 +28,9 @@ pub fn read(random: &mut Random, files: &Files, folder: &Path, a_byte: u64) -> R
     let settings = ImportSettings { scratch: Some(folder.into()), movable, ..ImportSettings::default() };
     let up = random.pick([None, None, Some(Up::Y), Some(Up::Z)]);
     let input = Input { up, ..Input::from(path) };
+    if random.chance(5) {
+        another_scene(random, &input, &settings)?;
+    }
     let opened = match import(&[input], &settings, &Progress::hidden()) {
         Ok(opened) => opened,
         Err(error) => return Ok(Verdict::Refused(error.to_string())),
@@ -42,6 +45,18 @@ pub fn read(random: &mut Random, files: &Files, folder: &Path, a_byte: u64) -> R
         return built(random, &opened, scene, folder, files.name());
     }
     Ok(Verdict::Read)
+}
+
+/// Asks for a scene that is there or not: which, a refusal says in one line.
+fn another_scene(random: &mut Random, input: &Input, settings: &ImportSettings) -> Result<(), Fault> {
+    let scene = random.pick(["0", "1", "first", "", "999999999999999999999"]).to_owned();
+    let input = Input { scene: Some(scene), ..input.clone() };
+    match import(&[input], settings, &Progress::hidden()) {
+        Err(error) if error.to_string().contains('\n') => {
+            Err(Fault::new("a refusal is not one line", error.to_string()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Whether a scene that was imported of so many bytes may be indexed freely.

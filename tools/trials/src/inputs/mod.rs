@@ -4,6 +4,7 @@
 pub mod arrays;
 pub mod bricks_file;
 pub mod compressed;
+pub mod draco;
 pub mod environment;
 pub mod field;
 pub mod gltf;
@@ -194,5 +195,34 @@ pub fn harmed_image(random: &mut Random, harm: Harm, percent: usize) -> Vec<u8> 
         crate::mutate::chunks::change_png(harm, random, &mut bytes);
     }
     harm.bytes(random, &mut bytes, percent / 2);
+    bytes
+}
+
+/// A KTX2 file of one level in UASTC (KTX 2.0, sections 3 and 5): most blocks of one colour, the others of any bits.
+pub fn ktx2(random: &mut Random, harm: Harm) -> Vec<u8> {
+    let (width, height) = (random.within(1, 9) as u32, random.within(1, 9) as u32);
+    let mut blocks: Vec<u8> = (0..16 * width.div_ceil(4) * height.div_ceil(4)).map(|_| random.word() as u8).collect();
+    for block in blocks.chunks_exact_mut(16).filter(|_| random.chance(80)) {
+        // The mode of one colour: five bits.
+        block[0] = block[0] & !31 | 23;
+    }
+    let word = |bytes: &mut Vec<u8>, value: u32| bytes.extend_from_slice(&value.to_le_bytes());
+    let mut bytes = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
+    // No format of Vulkan, bytes; size; no depth, no layers, one face, one level, no supercompression; where the
+    // descriptor is, where keys are, where global data is.
+    for value in [0, 1, width, height, 0, 0, 1, 1, 0, 104, 44, 0, 0, 0, 0, 0, 0] {
+        word(&mut bytes, value);
+    }
+    // The level: where, its length, and that again.
+    for value in [160, 0, blocks.len() as u32, 0, blocks.len() as u32, 0] {
+        word(&mut bytes, value);
+    }
+    // The descriptor: its length, kind and version; UASTC, BT.709, sRGB; blocks of 4x4; a sample of 128 bits, RGBA.
+    for value in [44, 0, 40 << 16 | 2, 166 | 1 << 8 | 2 << 16, 3 | 3 << 8, 16, 0, 127 << 16 | 3 << 24, 0, 0, u32::MAX] {
+        word(&mut bytes, value);
+    }
+    bytes.resize(160, 0);
+    bytes.extend_from_slice(&blocks);
+    harm.bytes(random, &mut bytes, 30);
     bytes
 }

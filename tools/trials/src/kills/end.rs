@@ -69,6 +69,12 @@ impl End {
         matches!(self, Self::None | Self::Full(_) | Self::Memory(_))
     }
 
+    /// Whether the C library ended the process, in its own words: it does where there is no memory to note what a new
+    /// thread has to take away, and asks nobody.
+    pub fn is_cut(&self, run: &Run) -> bool {
+        matches!(self, Self::Memory(_)) && run.said.starts_with("Fatal glibc error: failed to register TLS destructor")
+    }
+
     /// Runs a command to this end.
     ///
     /// # Errors
