@@ -182,7 +182,7 @@ pub fn traverse(resident: &Resident, payload: Payload, bytes: &[u8]) {
         }
     }
     assert_eq!(visits, brick.node_count);
-    let corners = Corners::new(&brick, bytes);
+    let corners = Corners::new(brick, bytes);
     let places = (0..brick.triangle_count).flat_map(|triangle| corners.of(triangle)).flatten();
     assert!(places.into_iter().all(f64::is_finite), "vertices are finite");
 }
