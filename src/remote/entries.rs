@@ -61,7 +61,9 @@ impl Entries {
         let mut file = File::open(&path).ok()?;
         let mut head = [0; HEAD_BYTES];
         let mut bytes = Vec::new();
-        let read = file.read_exact(&mut head).and_then(|()| file.read_to_end(&mut bytes));
+        // No more than it should have, and a byte that shows that there is more.
+        let most = (end - start).saturating_add(1);
+        let read = file.read_exact(&mut head).and_then(|()| (&file).take(most).read_to_end(&mut bytes));
         let expected = header(&bytes);
         if read.is_err() || head != expected || bytes.len() as u64 != end - start {
             self.drop_entry(start, end);

@@ -10,7 +10,7 @@ use crate::own;
 use crate::threads;
 
 /// All kinds, those that are fast first.
-pub static ALL: [&(dyn Kind + 'static); 47] = [
+pub static ALL: &[&dyn Kind] = &[
     &inputs::gltf::Glb,
     &inputs::gltf::Gltf,
     &inputs::compressed::Compressed,
@@ -34,6 +34,7 @@ pub static ALL: [&(dyn Kind + 'static); 47] = [
     &inputs::arrays::Arrays,
     &inputs::rates::RateFiles,
     &inputs::rows::RowFiles,
+    &inputs::disk_cache::DiskCaches,
     &differences::Builds,
     &differences::Schedules,
     &differences::Exact,
@@ -58,10 +59,11 @@ pub static ALL: [&(dyn Kind + 'static); 47] = [
     &kills::QUERY,
     &kills::TRACE,
     &kills::PARTS,
+    &kills::CLUSTER,
 ];
 
 /// The kind of this name, those that misbehave on purpose among them.
 pub fn find(name: &str) -> Option<&'static dyn Kind> {
     let own = own::ALL.iter().map(|kind| kind as &dyn Kind);
-    ALL.into_iter().chain(own).find(|kind| kind.name() == name)
+    ALL.iter().copied().chain(own).find(|kind| kind.name() == name)
 }

@@ -27,6 +27,7 @@ pub mod page;
 pub mod planted;
 pub mod random;
 pub mod scenes;
+mod settings;
 pub mod slice;
 mod stream;
 pub mod tally;

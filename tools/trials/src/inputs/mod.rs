@@ -4,6 +4,7 @@
 pub mod arrays;
 pub mod bricks_file;
 pub mod compressed;
+pub mod disk_cache;
 pub mod draco;
 pub mod environment;
 pub mod field;

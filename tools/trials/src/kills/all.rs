@@ -152,3 +152,14 @@ pub static PARTS: Kills = Kills {
     output: None,
     keeps: &["out/"],
 };
+
+/// `brickwalk-cluster convert`.
+pub static CLUSTER: Kills = Kills {
+    name: "kills/cluster",
+    about: "brickwalk-cluster convert on two workers; it has to be on PATH, of the same commit",
+    before: &[LARGE_GLB],
+    words: "@brickwalk-cluster convert in.glb --workers 2 --memory 56M --brick-triangles 1K -o a.bricks",
+    again: "",
+    output: Some("a.bricks"),
+    keeps: &[".a.bricks"],
+};

@@ -24,7 +24,7 @@ pub struct Kills {
     pub about: &'static str,
     /// Commands that make the inputs, words with spaces between them; `*` begins one that makes rays.
     pub before: &'static [&'static str],
-    /// The command.
+    /// The command; `@` begins one of another program, which is looked for on PATH.
     pub words: &'static str,
     /// Further words of the command that is run again.
     pub again: &'static str,
@@ -63,6 +63,13 @@ impl Kind for Kills {
 
     fn limits(&self) -> Limits {
         Limits { seconds: 1000.0, bytes: 1 << 30 }
+    }
+
+    fn lacks(&self) -> Option<String> {
+        let name = self.words.split_whitespace().next()?.strip_prefix('@')?;
+        let folders = std::env::var_os("PATH").unwrap_or_default();
+        let is_there = std::env::split_paths(&folders).any(|folder| folder.join(name).is_file());
+        (!is_there).then(|| format!("{name} is not on PATH; tools/cluster/test.sh installs it"))
     }
 
     fn trial(&self, trial: &Trial) -> Result<Outcome, Fault> {
@@ -137,8 +144,13 @@ impl Kills {
     }
 
     fn command(&self, trial: &Trial, folder: &Path, more: &str) -> Command {
-        let words = self.words.split_whitespace().chain(more.split_whitespace());
-        command(trial.program, folder, words.map(OsString::from))
+        let mut words = self.words.split_whitespace().chain(more.split_whitespace()).peekable();
+        let other = words.next_if(|word| word.starts_with('@')).map(|word| Path::new(&word[1..]));
+        let mut command = command(other.unwrap_or(trial.program), folder, words.map(OsString::from));
+        if other.is_some() {
+            command.env("BRICKWALK", trial.program);
+        }
+        command
     }
 
     /// Whether a run ended as it should, and left what it should.
