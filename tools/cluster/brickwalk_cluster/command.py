@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import re
 import sys
 from collections.abc import Sequence
 from typing import Any
@@ -105,9 +106,11 @@ def _names(text: str) -> list[str]:
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 1_000_000:
-        raise argparse.ArgumentTypeError(f"{text}: give a whole number from 1 to 1000000")
-    return int(text)
+    found = re.fullmatch(r"([0-9]{1,7})([KM]?)", text)
+    count = int(found[1]) * {"": 1, "K": 1000, "M": 1_000_000}[found[2]] if found else 0
+    if not 1 <= count <= 1_000_000:
+        raise argparse.ArgumentTypeError(f"{text}: give a whole number from 1 to 1M, as 16K")
+    return count
 
 
 def _do(options: argparse.Namespace, rest: list[str], cluster: Cluster) -> str:

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from brickwalk_cluster import Cluster, Failed
+from brickwalk_cluster.command import parser
 from brickwalk_cluster.command import run as command
 from brickwalk_cluster.commands import merge, split
 
@@ -83,3 +84,12 @@ def test_what_a_part_says_is_passed_on(tmp_path, program, capfd):
     assert command(line) == 1
     said = capfd.readouterr().err.strip().splitlines()[-1]
     assert said.startswith("brickwalk-cluster: ") and "none.bricks" in said
+
+
+def test_counts_may_be_thousands():
+    words = ["convert", "a.glb", "-o", "a.bricks", "--brick-triangles"]
+    for text, count in [("7", 7), ("16K", 16_000), ("1M", 1_000_000)]:
+        assert parser().parse_args([*words, text]).brick_triangles == count
+    for wrong in ["0", "2M", "1.5K", "-1", "K", "\u0663"]:
+        with pytest.raises(SystemExit):
+            parser().parse_args([*words, wrong])

@@ -155,8 +155,8 @@ impl Kills {
 
     /// Whether a run ended as it should, and left what it should.
     fn judge(&self, end: &End, run: &Run, whole: &Whole, before: &Snapshot, folder: &Path) -> Result<(), Fault> {
-        let lines: Vec<&str> = run.said.lines().filter(|line| line.starts_with("brickwalk: ")).collect();
-        let is_told = lines.len() == 1 && !run.said.contains("panicked");
+        let is_own = |line: &&str| line.starts_with("brickwalk: ") || line.starts_with("brickwalk-cluster: ");
+        let is_told = run.said.lines().filter(is_own).count() == 1 && !run.said.contains("panicked");
         match run.status {
             Some(0) => {}
             Some(1) if is_told && end.is_told() => {}
