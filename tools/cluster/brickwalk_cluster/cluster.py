@@ -6,6 +6,7 @@ import os
 import shutil
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
@@ -53,14 +54,17 @@ class Cluster:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.workers = workers or (max(1, cores // 4) if shares_cores else 1)
         threads = str(max(1, cores // self.workers) if shares_cores else cores)
-        self._local = LocalCluster(
-            n_workers=self.workers,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=0,
-            dashboard_address=None,
-            env={"RAYON_NUM_THREADS": threads},
-        )
+        with warnings.catch_warnings():
+            # Another cluster of this machine has the usual port of a page that nobody is told of.
+            warnings.filterwarnings("ignore", "Port [0-9]+ is already in use", UserWarning)
+            self._local = LocalCluster(
+                n_workers=self.workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=0,
+                dashboard_address=None,
+                env={"RAYON_NUM_THREADS": threads},
+            )
         self.client = Client(self._local)
 
     def share_of_memory(self) -> int | None:
