@@ -67,6 +67,9 @@
 //! `cli` (default): the command line. `lab` (default): benchmarks and the selftest. Without them this is a library
 //! alone.
 
+// Compilers to come count the levels of wgpu's types, of which `Send` for mapped ranges is proved, up to this.
+#![recursion_limit = "256"]
+
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod counters;

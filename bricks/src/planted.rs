@@ -40,6 +40,8 @@ defects! {
     MeshoptCount = "meshopt-count", "inputs/meshopt";
     /// A tileset may refer to itself.
     TilesetCircle = "tileset-circle", "inputs/tiles";
+    /// A reference of a model may lead out of its folder.
+    Outside = "outside", "inputs/gltf";
     /// A picture may be larger than its bytes can hold.
     PngSize = "png-size", "inputs/pictures";
     /// A NumPy file may state more rows than it holds.
@@ -50,6 +52,8 @@ defects! {
     KeyframeTimes = "keyframe-times", "inputs/paths";
     /// A field of visibility may have a cell outside.
     DvfCell = "dvf-cell", "inputs/dvf";
+    /// An entry of a disk cache is read however long it is.
+    EntryLength = "entry-length", "inputs/disk-cache";
     /// The head of a part may be longer than the file.
     PartHead = "part-head", "inputs/parts";
     /// Payloads of a scene file may lie anywhere.

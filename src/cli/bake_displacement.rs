@@ -1,7 +1,7 @@
 //! `bake-displacement`: displacement fields into a scene file.
 
 use super::interrupt;
-use super::options::args::BakeDisplacementArgs;
+use super::options::scene_args::BakeDisplacementArgs;
 use crate::cli::output::{note, warn};
 use crate::remote;
 use crate::secondary::displacement::make::{Making, Outcome, Watch, add_fields};

@@ -1,6 +1,6 @@
 //! `convert`: scenes of common formats into one `.bricks` file.
 
-use super::options::args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
+use super::options::scene_args::{BuildArgs, ConvertArgs, MeshArgs, WorkArgs};
 use super::{bake_displacement, interrupt};
 use crate::cli::output::{Usage, note, warn};
 use crate::output::atomic;

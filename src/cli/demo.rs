@@ -1,6 +1,7 @@
 //! `brickwalk demo`: a city larger than the cache, generated, converted, walked through and reported.
 
-use super::options::args::{DemoArgs, SceneArgs, VerifyArgs};
+use super::options::args::DemoArgs;
+use super::options::scene_args::{SceneArgs, VerifyArgs};
 use super::walk::{self, Said};
 use super::{scene, verify};
 use crate::cli::output::note;

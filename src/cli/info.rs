@@ -5,7 +5,7 @@ mod levels;
 mod quality;
 
 use super::cached;
-use super::options::args::InfoArgs;
+use super::options::scene_args::InfoArgs;
 use crate::cli::output::{print, print_json};
 use crate::secondary::displacement::is_similarity;
 use crate::session::{Origin, open_scene};

@@ -4,8 +4,9 @@
 //! one that joins renders what is missing.
 
 use super::cached;
-use super::options::args::{Cli, Command, WalkArgs};
+use super::options::args::{Cli, Command};
 use super::options::job_args::{JobFormat, JobsArgs, PartRange};
+use super::options::render_args::WalkArgs;
 use crate::cli::output::{Usage, print};
 use crate::session::parts;
 use anyhow::Result;

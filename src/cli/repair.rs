@@ -6,7 +6,7 @@
 //! worse, and no second copy of a large file is needed.
 
 use super::convert::{expand, mesh_settings, usage, work_settings};
-use super::options::args::RepairArgs;
+use super::options::scene_args::RepairArgs;
 use super::{interrupt, verify};
 use crate::cli::output::{Usage, note};
 use crate::remote;

@@ -2,7 +2,7 @@
 
 use super::convert::{build_settings, check_output, summarise, usage, with_fields};
 use super::interrupt;
-use super::options::args::{BuildArgs, SceneArgs};
+use super::options::scene_args::{BuildArgs, SceneArgs};
 use super::options::scene_kind::SceneKind;
 use crate::cli::output::{Usage, note};
 use crate::settings::sizes::counted;

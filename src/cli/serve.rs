@@ -1,7 +1,7 @@
 //! `brickwalk serve`: the window in a browser, for machines without a screen.
 
 use super::cached;
-use super::options::args::ServeArgs;
+use super::options::render_args::ServeArgs;
 use crate::cli::output::{is_quiet, print};
 use crate::view::serve::{self, Options};
 use crate::view::studio::Pace;

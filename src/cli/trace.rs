@@ -1,7 +1,7 @@
 //! `brickwalk trace`: closest hits, or occlusion, of given rays.
 
 use super::cached;
-use super::options::args::TraceArgs;
+use super::options::render_args::TraceArgs;
 use crate::cli::output::{print_json, warn};
 use crate::kernels::Lod;
 use crate::kernels::layout::NONE;

@@ -1,6 +1,6 @@
 //! `verify`: every checksum and reference of a `.bricks` file.
 
-use super::options::args::VerifyArgs;
+use super::options::scene_args::VerifyArgs;
 use crate::cli::output::note;
 use crate::remote;
 use crate::settings::sizes::{counted, human_bytes};

@@ -1,7 +1,7 @@
 //! `brickwalk view`: a window to fly through a scene.
 
 use super::cached;
-use super::options::args::ViewArgs;
+use super::options::render_args::ViewArgs;
 use crate::view::studio::Pace;
 use crate::view::window::{self, Options};
 use anyhow::Result;

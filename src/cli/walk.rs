@@ -1,7 +1,7 @@
 //! `brickwalk walk`: frames along a camera path, with records, a summary and a report.
 
 use super::cached;
-use super::options::args::WalkArgs;
+use super::options::render_args::WalkArgs;
 use super::part::{self, Joined};
 use super::watcher::{UntilStopped, Watcher};
 use crate::cli::output::{Usage, is_quiet, note, print, warn};

@@ -1,10 +1,12 @@
 use crate::cli::options::args::*;
+use crate::cli::options::scene_kind::SceneKind;
 use crate::cli::output::Usage;
 use crate::schedule::Optimisation;
+use crate::session::Settings;
 use crate::settings::{Direction, EffectList, HostCacheSize, Level, Schedule};
 use crate::stream::Policy;
 use brickwalk_convert::build::LatticeStep;
-use brickwalk_scenes::Kind;
+use brickwalk_scenes::{Kind, Stiff};
 use clap::CommandFactory;
 use clap::error::ErrorKind;
 

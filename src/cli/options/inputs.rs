@@ -42,13 +42,13 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
         let inputs = match AFTER_FROM {
             false => inputs.required(true).help(
                 "Scene files (.gltf, .glb, .obj, .ply, .stl, tileset.json of 3D Tiles) or folders of them; triangle \
-                 ids are numbered in this order. --transform, --scene, --up and --unit apply to the input before them, \
-                 or to all inputs if they come first",
+                 ids are numbered in this order. --transform, --scene, --up, --unit and --within apply to the input \
+                 before them, or to all inputs if they come first",
             ),
             // It is listed last.
             true => inputs.long("from").action(ArgAction::Append).display_order(999).help(
-                "The inputs of the conversion in the same order, with their --transform, --scene, --up and --unit; \
-                 give its other options, too [default: generate the scene again, if it was generated]",
+                "The inputs of the conversion in the same order, with their --transform, --scene, --up, --unit and \
+                 --within; give its other options, too [default: generate the scene again, if it was generated]",
             ),
         };
         command
@@ -79,6 +79,13 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
                 ValueParser::new(unit),
                 "The unit of length of OBJ, PLY and STL files: mm, cm, m, in, ft [default: m]",
             ))
+            .arg(option(
+                "within",
+                "DIR",
+                value_parser!(PathBuf).into(),
+                "A folder around the input: the files that it names are read there and below, and nowhere else, \
+                 by symbolic links neither [default: the input's own folder, where links are followed]",
+            ))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -94,6 +101,7 @@ impl<const AFTER_FROM: bool> FromArgMatches for Inputs<AFTER_FROM> {
         let scenes = assign(&starts, indexed::<String>(matches, "scene"), "scene")?;
         let ups = assign(&starts, indexed::<Up>(matches, "up"), "up")?;
         let units = assign(&starts, indexed::<f64>(matches, "unit"), "unit")?;
+        let within = assign(&starts, indexed::<PathBuf>(matches, "within"), "within")?;
         let mut inputs = Vec::with_capacity(paths.len());
         for (i, (_, path)) in paths.into_iter().enumerate() {
             let kind = Kind::of(&path);
@@ -112,6 +120,7 @@ impl<const AFTER_FROM: bool> FromArgMatches for Inputs<AFTER_FROM> {
             input.scene = scenes.values[i].clone().filter(|_| has_scenes);
             input.up = ups.values[i].filter(|_| kind != Kind::Gltf);
             input.metres = units.values[i].filter(|_| kind != Kind::Tiles).unwrap_or(input.metres);
+            input.within = within.values[i].clone();
             inputs.push(input);
         }
         Ok(Self { inputs })
@@ -207,12 +216,14 @@ mod tests {
 
     #[test]
     fn options_belong_to_the_input_before_them() {
-        let inputs =
-            parse("--unit|mm|a.stl|--up|z|b.glb|--transform|-1 0 0 4  0 1 0 0  0 0 1 0|--scene|2|c.ply|--unit|ft");
+        let inputs = parse(
+            "--unit|mm|a.stl|--up|z|b.glb|--transform|-1 0 0 4  0 1 0 0  0 0 1 0|--scene|2|c.ply|--unit|ft|--within|d",
+        );
         let [a, b, c] = &inputs.unwrap()[..] else { panic!() };
         assert_eq!((a.up, a.metres, a.transform[3]), (Some(Up::Z), 0.001, 0.0));
         assert_eq!((b.up, b.scene.as_deref(), b.transform[3]), (None, Some("2"), 4.0));
         assert_eq!((c.up, c.metres, c.scene.as_deref()), (None, 0.3048, None));
+        assert_eq!((&a.within, &b.within, c.within.as_deref()), (&None, &None, Some(Path::new("d"))));
     }
 
     #[test]

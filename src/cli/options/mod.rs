@@ -6,6 +6,8 @@ pub mod inputs;
 pub mod job_args;
 pub mod query_args;
 pub mod removed;
+pub mod render_args;
+pub mod scene_args;
 pub mod scene_kind;
 pub mod scene_name;
 pub mod units;

@@ -85,6 +85,7 @@ def _add_convert(one: argparse.ArgumentParser) -> None:
     )
     one.add_argument("--up", choices=["y", "z"], default=nothing, help="the axis that points up")
     one.add_argument("--metres", type=float, metavar="X", default=nothing, help="metres of a unit of the models")
+    one.add_argument("--within", metavar="DIR", default=nothing, help="folder that models may name files of")
     one.add_argument("--fast", action="store_true", default=nothing, help="build trees sooner; tracing takes longer")
     one.add_argument(
         "--no-proxies", dest="proxies", action="store_false", default=nothing, help="no occupancy of bricks"

@@ -63,6 +63,8 @@ def convert(
     names, target, settings = checked(inputs, out, progress, settings)
     # Workers have other working directories.
     names, target = [os.path.abspath(name) for name in names], os.path.abspath(target)
+    if "within" in settings:
+        settings["within"] = os.path.abspath(settings["within"])
     settings.setdefault("threads", 1)
     resume = settings.pop("resume", True)
     job = names, target, settings

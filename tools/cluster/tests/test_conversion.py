@@ -246,6 +246,18 @@ def test_damaged_outputs_are_made_again(client, model, tmp_path):
     assert out.read_bytes() == one
 
 
+def test_models_may_name_files_of_a_folder_around_them(client, tmp_path, monkeypatch):
+    (tmp_path / "models").mkdir()
+    model = tmp_path / "models" / "box.obj"
+    model.write_text("mtllib ../paint.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl paint\nf 1 2 3\n")
+    (tmp_path / "paint.mtl").write_text("newmtl paint\nKd 1 0 0\n")
+    # Relative to this process, not to the workers.
+    monkeypatch.chdir(tmp_path)
+    done = conversion.convert(client, "models/box.obj", "box.bricks", within=".")
+    assert done["warnings"] == []
+    assert (tmp_path / "box.bricks").read_bytes() == alone(model, tmp_path / "one.bricks", within=tmp_path)
+
+
 def test_what_cannot_be_used_is_an_error(client, model, tmp_path):
     out = tmp_path / "a.bricks"
     with pytest.raises(FileNotFoundError):

@@ -239,6 +239,10 @@ impl Conversion {
                 }
                 self.inputs.iter_mut().for_each(|input| input.metres = metres);
             }
+            "within" => {
+                let folder: PathBuf = value.extract()?;
+                self.inputs.iter_mut().for_each(|input| input.within = Some(folder.clone()));
+            }
             _ => return Err(pyo3::exceptions::PyTypeError::new_err("there is no such setting")),
         }
         Ok(())

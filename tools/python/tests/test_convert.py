@@ -36,6 +36,19 @@ def test_settings_have_effects(model, tmp_path):
         np.testing.assert_allclose(scene.info["bounds"], [[0, 0, -0.5], [0.5, 0.5, 0]])
 
 
+def test_models_may_name_files_of_a_folder_around_them(model, tmp_path):
+    (tmp_path / "models").mkdir()
+    inner = tmp_path / "models" / "box.obj"
+    inner.write_text("mtllib ../paint.mtl\nusemtl paint\n" + model.read_text())
+    (tmp_path / "paint.mtl").write_text("newmtl paint\nKd 1 0 0\n")
+    alone = brickwalk.convert(inner, tmp_path / "box.bricks")
+    assert any("paint.mtl" in warning and "--within" in warning for warning in alone["warnings"])
+    assert brickwalk.convert(inner, tmp_path / "box.bricks", within=tmp_path)["warnings"] == []
+    (tmp_path / "other").mkdir()
+    with pytest.raises(brickwalk.BrickwalkError, match="box.obj: --within .*other: the file is not in it"):
+        brickwalk.convert(inner, tmp_path / "box.bricks", within=tmp_path / "other")
+
+
 @pytest.mark.parametrize(
     "options, error, text",
     [
@@ -48,6 +61,7 @@ def test_settings_have_effects(model, tmp_path):
         ({"lattice": "fine"}, TypeError, "lattice"),
         ({"lattice": 1000}, ValueError, "lattice"),
         ({"threads": 0}, ValueError, "threads"),
+        ({"within": 3}, TypeError, "within"),
         ({"progress": 3}, TypeError, "progress"),
         ({"no_such": 3}, TypeError, "no_such"),
     ],

@@ -17,6 +17,7 @@ mod opened;
 mod panics;
 mod plain;
 mod ply;
+mod reach;
 mod repairs;
 mod stl;
 mod table;
@@ -73,6 +74,9 @@ pub struct Input {
     pub up: Option<Up>,
     /// Metres that a unit of length stands for in OBJ, PLY and STL, finite and positive; glTF states its own.
     pub metres: f64,
+    /// A folder around the file, which its references may lead to, and below it, but not out of it, by symbolic links
+    /// neither. `None`: the file's own folder, out of which symbolic links may lead.
+    pub within: Option<PathBuf>,
     /// Placement of the whole input, in metres with Y up: row-major 3x4, finite.
     pub transform: [f64; 12],
 }
@@ -99,7 +103,7 @@ impl Input {
 
 impl From<PathBuf> for Input {
     fn from(path: PathBuf) -> Self {
-        Self { path, scene: None, up: None, metres: 1.0, transform: IDENTITY }
+        Self { path, scene: None, up: None, metres: 1.0, within: None, transform: IDENTITY }
     }
 }
 
@@ -140,9 +144,10 @@ fn open_all(inputs: &[Input], settings: &ImportSettings, progress: &Progress) ->
     for (input, format) in inputs.iter().zip(formats) {
         progress.check().map_err(ImportError::Interrupted)?;
         let (path, budget, axes) = (input.path.as_path(), &mut budget, input.axes(Up::Y));
+        let (file, asked) = ((path, input.within.as_deref()), (input.scene.as_deref(), &*settings.movable));
         let opened = match format {
-            Format::Gltf => gltf::open(path, input.scene.as_deref(), &settings.movable, &spool, budget)?,
-            Format::Obj => obj::open(path, &axes, &spool, budget)?,
+            Format::Gltf => gltf::open(file, asked, &spool, budget)?,
+            Format::Obj => obj::open(file, &axes, &spool, budget)?,
             Format::Ply => ply::open(path, &axes, &spool, budget)?,
             Format::Stl => stl::open(path, &axes, &spool, budget)?,
             Format::Tiles => {
@@ -166,7 +171,7 @@ fn append_tiles(
     budget: &mut TriangleBudget,
     progress: &Progress,
 ) -> Result<(), ImportError> {
-    let tileset = tiles::open(&input.path, spool)?;
+    let tileset = tiles::open(&input.path, input.within.as_deref(), spool)?;
     tileset.sources.into_iter().for_each(|source| imported.add_source(source));
     if tileset.copies > 0 {
         let (file, copies) = (show(&input.path), tileset.copies);
@@ -178,7 +183,7 @@ fn append_tiles(
     progress.phase("tiles", tileset.models.len() as u64);
     for model in &tileset.models {
         progress.check().map_err(ImportError::Interrupted)?;
-        let opened = tiles::open_model(model, &settings.movable, spool, budget)?;
+        let opened = tiles::open_model(model, (input.within.as_deref(), &settings.movable), spool, budget)?;
         let meshes = &opened.outline.meshes;
         let triangles = opened.outline.placements.iter().map(|p| meshes[p.mesh as usize].triangle_count()).sum();
         // Opening it counted one.

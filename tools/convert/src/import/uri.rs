@@ -1,6 +1,7 @@
 //! References to other files. URIs of glTF: data URIs and percent-encoded relative paths (glTF 2.0, sections 2.8 and
 //! 3.6; RFC 2397, RFC 3986).
 
+use bricks::planted::{self, Defect};
 use std::path::{Component, Path, PathBuf};
 
 /// What a URI refers to.
@@ -8,7 +9,7 @@ use std::path::{Component, Path, PathBuf};
 pub(super) enum Target {
     /// The bytes of a data URI.
     Data(Vec<u8>),
-    /// A path below the folder of the glTF file, without `.` and `..`.
+    /// A path below the root, without `.` and `..`.
     File(PathBuf),
 }
 
@@ -17,14 +18,9 @@ pub(super) fn is_data(uri: &str) -> bool {
     uri.as_bytes().get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case(b"data:"))
 }
 
-/// Resolves `uri`; the error says what is wrong with it. Only files in or below the folder of the glTF file are
-/// referred to: other schemes, absolute paths and paths that climb out of the folder are refused.
-pub(super) fn resolve(uri: &str) -> Result<Target, &'static str> {
-    resolve_from(Path::new(""), uri)
-}
-
-/// Resolves `uri` of a file in the folder `from` below that of the first file; the path is below the latter.
-pub(super) fn resolve_from(from: &Path, uri: &str) -> Result<Target, &'static str> {
+/// Resolves `uri` of a file in the folder `from`, which is below a root; the error says what is wrong with it. Only
+/// files in or below the root are referred to: other schemes, absolute paths and paths that climb out are refused.
+pub(super) fn resolve(from: &Path, uri: &str) -> Result<Target, &'static str> {
     if is_data(uri) {
         return data(&uri[5..]).map(Target::Data);
     }
@@ -46,8 +42,10 @@ pub(super) fn below(path: impl AsRef<Path>) -> Result<PathBuf, &'static str> {
             Component::Normal(name) => below.push(name),
             Component::CurDir => {}
             Component::ParentDir => {
-                if !below.pop() {
-                    return Err("the path leads out of the folder of the file");
+                if planted::is(Defect::Outside) {
+                    below.push("..");
+                } else if !below.pop() {
+                    return Err("the path leads out of the folder that may be read; convert --within names another");
                 }
             }
             Component::RootDir | Component::Prefix(_) => return Err("the path is absolute"),
@@ -120,6 +118,10 @@ fn base64(text: &[u8]) -> Result<Vec<u8>, &'static str> {
 mod tests {
     use super::*;
 
+    fn resolve(uri: &str) -> Result<Target, &'static str> {
+        super::resolve(Path::new(""), uri)
+    }
+
     #[test]
     fn base64_of_rfc_4648() {
         for (text, bytes) in
@@ -172,6 +174,13 @@ mod tests {
         ];
         for uri in bad {
             assert!(resolve(uri).is_err(), "{uri}");
+        }
+        // A root around the folder of the file.
+        let from = |uri| super::resolve(Path::new("a/b"), uri);
+        assert_eq!(from("../../c.bin"), file("c.bin"));
+        assert_eq!(from("d.bin"), file("a/b/d.bin"));
+        for uri in ["../../../c.bin", "/c.bin", "../.."] {
+            assert!(from(uri).is_err(), "{uri}");
         }
     }
 }

@@ -36,6 +36,7 @@ def convert(
     bake_budget: int | None = None,
     up: str | None = None,
     metres: float | None = None,
+    within: Path | None = None,
 ) -> dict[str, Any]:
     """Converts models into one scene file, which appears whole or not at all.
 
@@ -50,7 +51,8 @@ def convert(
     conversion. ``drop_non_finite`` leaves out triangles that are not finite. ``movable`` names nodes that stay
     instances. ``instance_min_triangles`` least triangles of a mesh that is stored once for all its places.
     ``bake_budget`` most triangles of smaller meshes that are copied. ``up`` "y" or "z", and ``metres`` a unit stands
-    for, of OBJ, PLY and STL.
+    for, of OBJ, PLY and STL. ``within`` a folder around the inputs: what they name is read there and below, and nowhere
+    else; by default in each one's own folder.
 
     Returns a dict of counts: triangles, triangles_stored, instances, bricks, levels, bytes, dropped_zero_area,
     dropped_non_finite, and warnings, a list.

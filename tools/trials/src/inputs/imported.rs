@@ -7,7 +7,7 @@ use brickwalk_convert::build::{BuildSettings, build, build_source};
 use brickwalk_convert::import::{ImportSettings, Imported, Input, Up, import, load_all};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::SourceScene;
-use std::path::Path;
+use std::path::{Component, Path};
 
 /// Most triangles for a byte of the input, but of inputs with compressed geometry.
 pub const TRIANGLES_A_BYTE: u64 = 64;
@@ -23,11 +23,18 @@ const MOST_BUILT: u64 = 4096;
 /// # Errors
 /// The scene breaks a promise.
 pub fn read(random: &mut Random, files: &Files, folder: &Path, a_byte: u64) -> Result<Verdict, Fault> {
-    let path = files.write(folder)?;
+    // Files of the same names lie beside the model's folder, which may be read or not.
+    let own = folder.join("model");
+    let path = files.write(&own)?;
+    if random.chance(20) {
+        files.write(folder)?;
+    }
+    let within = random.chance(20).then(|| folder.to_owned());
+    let root = within.clone().unwrap_or(own);
     let movable = if random.chance(10) { vec!["a*".to_owned()] } else { Vec::new() };
     let settings = ImportSettings { scratch: Some(folder.into()), movable, ..ImportSettings::default() };
     let up = random.pick([None, None, Some(Up::Y), Some(Up::Z)]);
-    let input = Input { up, ..Input::from(path) };
+    let input = Input { up, within, ..Input::from(path) };
     if random.chance(5) {
         another_scene(random, &input, &settings)?;
     }
@@ -35,6 +42,7 @@ pub fn read(random: &mut Random, files: &Files, folder: &Path, a_byte: u64) -> R
         Ok(opened) => opened,
         Err(error) => return Ok(Verdict::Refused(error.to_string())),
     };
+    stays_within(&opened, &root)?;
     let scene = match load_all(&opened) {
         Ok(scene) => scene,
         Err(error) => return Ok(Verdict::Refused(error.to_string())),
@@ -45,6 +53,17 @@ pub fn read(random: &mut Random, files: &Files, folder: &Path, a_byte: u64) -> R
         return built(random, &opened, scene, folder, files.name());
     }
     Ok(Verdict::Read)
+}
+
+/// Whether nothing was looked for outside `root`.
+fn stays_within(opened: &Imported, root: &Path) -> Result<(), Fault> {
+    let is_within = |path: &Path| {
+        path.strip_prefix(root).is_ok_and(|below| below.components().all(|part| matches!(part, Component::Normal(_))))
+    };
+    match opened.files().iter().find(|file| !is_within(&file.path)) {
+        Some(file) => Err(Fault::new("a reference leads out of the folder", file.path.display().to_string())),
+        None => Ok(()),
+    }
 }
 
 /// Asks for a scene that is there or not: which, a refusal says in one line.

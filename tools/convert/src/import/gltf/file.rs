@@ -4,6 +4,7 @@ use super::document::{BEYOND, Document, VersionOnly};
 use super::glb;
 use crate::import::bytes::{Bytes, Spool};
 use crate::import::error::{EXPORT_AGAIN, ImportError, one_line, show};
+use crate::import::reach::Reach;
 use crate::import::uri;
 use crate::import::warnings::Warnings;
 use gltf::json::{self, Index};
@@ -50,10 +51,10 @@ impl Problem {
 }
 
 impl File {
-    /// Opens the file and its buffers: `whole`, of which `bytes` are glTF. Extensions that are ignored are noted in
-    /// `warnings`.
+    /// Opens the file and its buffers: `whole`, of which `bytes` are glTF. References lead as far as `within` lets
+    /// them ([`Reach::of`]). Extensions that are ignored are noted in `warnings`.
     pub fn open(
-        path: &Path,
+        (path, within): (&Path, Option<&Path>),
         [whole, bytes]: [&Bytes; 2],
         spool: Arc<Spool>,
         warnings: &mut Warnings,
@@ -80,8 +81,7 @@ impl File {
         let mut document = parse(&json.read().map_err(unreadable)?).map_err(&syntax)?;
         check_extensions(&label, &document, warnings)?;
 
-        let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        let mut found = Found { folder, spool: &spool, files: BTreeMap::new() };
+        let mut found = Found { reach: Reach::of(path, within)?, spool: &spool, files: BTreeMap::new() };
         let mut bin = chunks.bin.as_ref().and_then(piece);
         let mut buffers = Vec::with_capacity(document.buffers.len());
         let mut input_bytes = bytes.len();
@@ -172,7 +172,7 @@ impl File {
 
 /// The files that URIs lead to, each found once, and the data of data URIs, in the spool.
 struct Found<'a> {
-    folder: PathBuf,
+    reach: Reach,
     spool: &'a Spool,
     files: BTreeMap<PathBuf, Result<Bytes, String>>,
 }
@@ -206,14 +206,14 @@ impl Found<'_> {
     /// The bytes that `text` leads to, and whether it is the first that does.
     fn get(&mut self, text: &str) -> Result<(Bytes, bool), Missing> {
         let refused = |problem| Missing::Uri(format!("{problem} ({})", one_line(text)));
-        match uri::resolve(text).map_err(refused)? {
+        match self.reach.resolve(text).map_err(refused)? {
             uri::Target::Data(data) => Ok((self.spool.add(&data).map_err(Missing::Spool)?, true)),
             uri::Target::File(below) => {
                 let mut is_new = false;
-                let (folder, spool) = (&self.folder, self.spool);
+                let (reach, spool) = (&self.reach, self.spool);
                 let found = self.files.entry(below).or_insert_with_key(|below| {
                     is_new = true;
-                    let bytes = spool.file(&folder.join(below));
+                    let bytes = reach.file(below, spool);
                     bytes.map_err(|reason| format!("cannot read {}: {reason}", show(below)))
                 });
                 Ok((found.clone().map_err(Missing::File)?, is_new))

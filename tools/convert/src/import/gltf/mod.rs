@@ -81,23 +81,23 @@ struct Mesh {
 }
 
 /// Opens one .gltf or .glb file: of its scenes the one that is asked for, by name or number; placements tell which
-/// nodes above them `movable` names.
+/// nodes above them the asked names match. References lead as far as `within` lets them
+/// ([`Reach::of`](super::reach::Reach::of)).
 pub(super) fn open(
-    path: &Path,
-    scene: Option<&str>,
-    movable: &[String],
+    (path, within): (&Path, Option<&Path>),
+    asked: (Option<&str>, &[String]),
     spool: &Arc<Spool>,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
     let unreadable = |reason| ImportError::Read { file: show(path), reason };
     let bytes = spool.file(path).map_err(unreadable)?;
-    open_within(path, [&bytes, &bytes], (scene, movable), &IDENTITY, spool, budget)
+    open_piece((path, within), [&bytes, &bytes], asked, &IDENTITY, spool, budget)
 }
 
 /// Opens the glTF file that is a piece of the file at `path`, whose bytes are `[all, piece]`, placed by `placing`: a
 /// rotation, and a translation to which the centre of CESIUM_RTC adds.
-pub(super) fn open_within(
-    path: &Path,
+pub(super) fn open_piece(
+    (path, within): (&Path, Option<&Path>),
     bytes: [&Bytes; 2],
     asked: (Option<&str>, &[String]),
     placing: &Affine,
@@ -105,7 +105,7 @@ pub(super) fn open_within(
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
     let mut warnings = Warnings::new(show(path));
-    let mut file = File::open(path, bytes, spool.clone(), &mut warnings)?;
+    let mut file = File::open((path, within), bytes, spool.clone(), &mut warnings)?;
     let mut placing = *placing;
     for (row, center) in file.document.extensions.rtc.iter().flat_map(|rtc| rtc.center.into_iter().enumerate()) {
         placing[4 * row + 3] += center;

@@ -11,6 +11,7 @@ use super::error::{ImportError, one_line};
 use super::image::decode_texture;
 use super::opened::{Opened, Parts, TriangleBudget};
 use super::plain::{self, doubles, fault, floats, unreadable};
+use super::reach::Reach;
 use super::repairs::Repairs;
 use super::table::Table;
 use super::tangents;
@@ -65,14 +66,15 @@ enum Picture {
     Grey([Option<Result<Bytes, String>>; 2]),
 }
 
-/// Opens one .obj file.
+/// Opens one .obj file. References lead as far as `within` lets them ([`Reach::of`]).
 pub(super) fn open(
-    path: &Path,
+    (path, within): (&Path, Option<&Path>),
     axes: &[f64; 12],
     spool: &Spool,
     budget: &mut TriangleBudget,
 ) -> Result<Opened, ImportError> {
     let mut start = plain::start(path, spool)?;
+    let reach = Reach::of(path, within)?;
     let label = start.label.clone();
     let stream = start.bytes.stream(spool).map_err(|e| unreadable(path, &e))?;
     let (parsed, stream) = parse::parse(path, stream, spool, &mut start.warnings, budget)?;
@@ -80,7 +82,7 @@ pub(super) fn open(
     if parsed.triangles.count() == 0 {
         return Err(fault(path, "faces", "the file has none"));
     }
-    let Looks { materials, textures } = looks(path, &parsed, spool, &mut start.warnings, &mut hash);
+    let Looks { materials, textures } = looks(&reach, &parsed, spool, &mut start.warnings, &mut hash);
 
     let mut meshes: Vec<MeshOutline> = Vec::new();
     let mut parts: Vec<Vec<(Run, u64)>> = Vec::new();
@@ -137,11 +139,10 @@ struct Looks {
 }
 
 /// The materials that `parsed` uses, from the files that it names.
-fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, hash: &mut Xxh3) -> Looks {
-    let folder = path.parent().unwrap_or(Path::new(""));
+fn looks(reach: &Reach, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, hash: &mut Xxh3) -> Looks {
     let mut known = HashMap::new();
     for library in &parsed.libraries {
-        match read_library(folder, library, spool, hash) {
+        match read_library(reach, library, spool, hash) {
             Ok(definitions) => {
                 for definition in definitions {
                     known.entry(definition.name.clone()).or_insert(definition);
@@ -164,7 +165,7 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
             continue;
         };
         let mut material = definition.material;
-        let open = |file: &String| beside(folder, file).and_then(|path| spool.file(&path));
+        let open = |file: &String| beside(reach, file, spool);
         let mut add = |key: [Option<&mtl::Map>; 3], make: &dyn Fn() -> Texture| {
             *numbers.entry(key.map(|map| map.cloned())).or_insert_with(|| {
                 textures.push(make());
@@ -196,8 +197,8 @@ fn looks(path: &Path, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings, h
     Looks { materials, textures }
 }
 
-fn read_library(folder: &Path, library: &str, spool: &Spool, hash: &mut Xxh3) -> Result<Vec<mtl::Definition>, String> {
-    let bytes = spool.file(&beside(folder, library)?)?;
+fn read_library(reach: &Reach, library: &str, spool: &Spool, hash: &mut Xxh3) -> Result<Vec<mtl::Definition>, String> {
+    let bytes = beside(reach, library, spool)?;
     if bytes.len() > MAX_MATERIALS_BYTES {
         return Err("it is too large".into());
     }
@@ -205,9 +206,9 @@ fn read_library(folder: &Path, library: &str, spool: &Spool, hash: &mut Xxh3) ->
     mtl::read(&mut Lines::new(bytes.stream(spool).map_err(|e| e.to_string())?)).map_err(|e| e.to_string())
 }
 
-/// A file in or below `folder`; its path may be written as on Windows.
-fn beside(folder: &Path, file: &str) -> Result<std::path::PathBuf, String> {
-    uri::below(file.replace('\\', "/")).map(|below| folder.join(below)).map_err(str::to_owned)
+/// The bytes of a file that the OBJ file names; the path may be written as on Windows.
+fn beside(reach: &Reach, file: &str, spool: &Spool) -> Result<Bytes, String> {
+    reach.file(&uri::below(reach.own(file.replace('\\', "/")))?, spool)
 }
 
 impl Parts for Obj {

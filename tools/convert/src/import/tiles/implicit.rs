@@ -150,7 +150,7 @@ impl Walk<'_> {
         let place = format!("subtree \"{}\"", one_line(&text));
         let refuse = |what: &str| fault(&grid.place.parsed.label, place.clone(), what.to_owned());
         let from = grid.place.below.parent().unwrap_or(Path::new(""));
-        let uri::Target::File(below) = uri::resolve_from(from, &text).map_err(refuse)? else {
+        let uri::Target::File(below) = uri::resolve(from, &text).map_err(refuse)? else {
             return Err(refuse("data URIs are not read here"));
         };
         if let Some(subtree) = self.subtrees.get(&below) {
@@ -161,7 +161,7 @@ impl Walk<'_> {
         let mut buffer = |uri: &str| self.buffer(&folder, uri);
         let counts = [grid.before(grid.subtree_levels), 1 << (grid.axes * grid.subtree_levels)];
         let subtree = subtree::read(&bytes, counts, &mut buffer);
-        let path = self.folder.join(&below);
+        let path = self.reach.path(&below);
         let subtree = Arc::new(subtree.map_err(|what| fault(&show(&path), "subtree".into(), what))?);
         self.subtrees.insert(below, subtree.clone());
         Ok(subtree)
@@ -170,7 +170,7 @@ impl Walk<'_> {
     /// A buffer of a subtree in `folder`.
     fn buffer(&mut self, folder: &Path, uri: &str) -> Result<Bytes, String> {
         let named = |what: &str| format!("buffer \"{}\": {what}", one_line(uri));
-        match uri::resolve_from(folder, uri).map_err(named)? {
+        match uri::resolve(folder, uri).map_err(named)? {
             uri::Target::Data(bytes) => self.spool.add(&bytes),
             uri::Target::File(below) => self.source(&below).map_err(|error| error.to_string()),
         }
@@ -181,15 +181,15 @@ impl Walk<'_> {
         if let Some(bytes) = self.files.get(below) {
             return Ok(bytes.clone());
         }
-        let path = self.folder.join(below);
+        let path = self.reach.path(below);
         let unreadable = |reason: String| ImportError::Read { file: show(&path), reason };
-        let bytes = self.spool.file(&path).map_err(unreadable)?;
+        let bytes = self.reach.file(below, self.spool).map_err(unreadable)?;
         if bytes.len() > MAX_BYTES {
             return Err(unreadable(format!("{} bytes are too many for a file of tiles", bytes.len())));
         }
         let mut hash = xxhash_rust::xxh3::Xxh3::new();
         bytes.hash(self.spool, &mut hash).map_err(|e| unreadable(e.to_string()))?;
-        let name = below.to_string_lossy().into_owned();
+        let name = self.reach.name(below);
         self.sources.push(bricks::Source { name, bytes: bytes.len(), hash: format!("{:016x}", hash.digest()) });
         self.files.insert(below.to_owned(), bytes.clone());
         Ok(bytes)

@@ -16,6 +16,7 @@ use super::affine::{Affine, from_columns, multiply};
 use super::bytes::{Bytes, Spool};
 use super::error::{EXPORT_AGAIN, ImportError, one_line, show};
 use super::opened::{self, TriangleBudget};
+use super::reach::Reach;
 use super::{gltf, uri};
 use crate::source::IDENTITY;
 use bricks::planted::{self, Defect};
@@ -88,7 +89,7 @@ struct Parsed {
 /// Where a tile is met.
 #[derive(Clone)]
 struct Place {
-    /// The tileset's path below the folder of the first one.
+    /// The tileset's path below the root of what the first one reaches.
     below: PathBuf,
     parsed: Arc<Parsed>,
     axis: Axis,
@@ -98,7 +99,7 @@ struct Place {
 
 /// A walk through the tiles.
 struct Walk<'a> {
-    folder: PathBuf,
+    reach: Reach,
     spool: &'a Arc<Spool>,
     tilesets: BTreeMap<PathBuf, Arc<Parsed>>,
     subtrees: BTreeMap<PathBuf, Arc<Subtree>>,
@@ -116,12 +117,13 @@ struct Walk<'a> {
 /// A model that a tile shows: its number and where.
 type Shown = (usize, Affine);
 
-/// Reads the tileset at `path` and what it refers to, up to the models.
-pub(super) fn open(path: &Path, spool: &Arc<Spool>) -> Result<Opened, ImportError> {
-    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let below = PathBuf::from(path.file_name().unwrap_or_default());
+/// Reads the tileset at `path` and what it refers to, up to the models, as far as `within` lets references lead
+/// ([`Reach::of`]).
+pub(super) fn open(path: &Path, within: Option<&Path>, spool: &Arc<Spool>) -> Result<Opened, ImportError> {
+    let reach = Reach::of(path, within)?;
+    let below = reach.own(path.file_name().unwrap_or_default());
     let mut walk = Walk {
-        folder,
+        reach,
         spool,
         tilesets: BTreeMap::new(),
         subtrees: BTreeMap::new(),
@@ -157,7 +159,7 @@ impl Walk<'_> {
         if let Some(parsed) = self.tilesets.get(below) {
             return Ok(parsed.clone());
         }
-        let label = show(&self.folder.join(below));
+        let label = show(&self.reach.path(below));
         let text = self.source(below)?.read();
         let text = text.map_err(|reason| ImportError::Read { file: label.clone(), reason })?;
         let tileset = document::parse(&label, &text)?;
@@ -253,7 +255,7 @@ impl Walk<'_> {
         let label = &place.parsed.label;
         let refuse = |what: &str| fault(label, format!("content \"{}\"", one_line(text)), what.to_owned());
         let from = place.below.parent().unwrap_or(Path::new(""));
-        let below = match uri::resolve_from(from, text).map_err(refuse)? {
+        let below = match uri::resolve(from, text).map_err(refuse)? {
             uri::Target::File(below) => below,
             uri::Target::Data(_) => return Err(refuse("data URIs are not read here")),
         };
@@ -262,9 +264,9 @@ impl Walk<'_> {
             return Ok(Shows::Model(*model, places.clone()));
         }
         let (below, axis) = key;
-        let path = self.folder.join(&below);
+        let path = self.reach.path(&below);
         let unreadable = |reason: String| ImportError::Read { file: show(&path), reason };
-        let bytes = self.spool.file(&path).map_err(unreadable)?;
+        let bytes = self.reach.file(&below, self.spool).map_err(unreadable)?;
         let reader = bytes.open().map_err(|e| unreadable(e.to_string()))?;
         let mut magic = [0; 4];
         let read = reader.read_at(0, &mut magic[..bytes.len().min(4) as usize]);
@@ -316,15 +318,15 @@ impl Walk<'_> {
     fn gltf_at(&mut self, uri: &str, below: &Path, axis: Axis) -> Result<usize, String> {
         let named = |what: &str| format!("its glTF file \"{}\": {what}", one_line(uri));
         let from = below.parent().unwrap_or(Path::new(""));
-        let uri::Target::File(gltf) = uri::resolve_from(from, uri).map_err(named)? else {
+        let uri::Target::File(gltf) = uri::resolve(from, uri).map_err(named)? else {
             return Err(named("data URIs are not read here"));
         };
         let key = (gltf, axis);
         if let Some((model, _)) = self.numbers.get(&key) {
             return Ok(*model);
         }
-        let path = self.folder.join(&key.0);
-        let bytes = self.spool.file(&path).map_err(|what| named(&what))?;
+        let path = self.reach.path(&key.0);
+        let bytes = self.reach.file(&key.0, self.spool).map_err(|what| named(&what))?;
         let number = self.model(path, [bytes.clone(), bytes], axis.z_from_up());
         self.numbers.insert(key, (number, [IDENTITY].into()));
         Ok(number)
@@ -356,11 +358,12 @@ fn starts_json(start: &[u8; 4]) -> bool {
 /// Opens a model: its placements are those in its tile, Z up.
 pub(super) fn open_model(
     model: &Model,
-    movable: &[String],
+    (within, movable): (Option<&Path>, &[String]),
     spool: &Arc<Spool>,
     budget: &mut TriangleBudget,
 ) -> Result<opened::Opened, ImportError> {
-    gltf::open_within(&model.path, model.bytes.each_ref(), (None, movable), &model.tile_from_model, spool, budget)
+    let file = (model.path.as_path(), within);
+    gltf::open_piece(file, model.bytes.each_ref(), (None, movable), &model.tile_from_model, spool, budget)
 }
 
 fn fault(file: &str, place: String, problem: String) -> ImportError {

@@ -7,6 +7,7 @@ mod fuzz;
 mod implicit;
 mod instanced;
 mod oracle;
+mod reach;
 mod scenes;
 mod surfaces;
 mod tiles;
