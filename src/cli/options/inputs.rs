@@ -82,7 +82,7 @@ impl<const AFTER_FROM: bool> Args for Inputs<AFTER_FROM> {
             .arg(option(
                 "within",
                 "DIR",
-                value_parser!(PathBuf).into(),
+                value_parser!(PathBuf),
                 "A folder around the input: the files that it names are read there and below, and nowhere else, \
                  by symbolic links neither [default: the input's own folder, where links are followed]",
             ))
