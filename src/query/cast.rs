@@ -240,7 +240,7 @@ impl Queries {
     /// Whether each ray meets anything; with `passes` anything that it does not pass through.
     pub(super) fn meets_any(&self, rays: &[Ray], passes: bool, watch: &mut Watch) -> Result<Vec<bool>> {
         let found = self.find(rays, (true, passes), watch)?;
-        Ok(found.iter().map(|found| found.id != NONE).collect())
+        Ok(self.threads.install(|| found.par_iter().map(|found| found.id != NONE).collect()))
     }
 
     fn find(&self, rays: &[Ray], (any, passes): (bool, bool), watch: &mut Watch) -> Result<Vec<Found>> {

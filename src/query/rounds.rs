@@ -140,14 +140,15 @@ impl Queries {
         &self,
         seek: &S,
         items: &[S::Item],
-        nothing: impl Fn() -> S::Found,
+        nothing: impl Fn() -> S::Found + Sync,
         opacity: &[[u32; 4]],
         watch: &mut Watch,
     ) -> Result<Vec<S::Found>> {
         let (resident, isa) = (self.scene.resident(), Best::for_one());
         let count = resident.exact_bricks() as u32;
-        let mut sought: Vec<Sought<S::Found>> =
-            items.iter().map(|_| Sought { found: nothing(), is_done: false }).collect();
+        // By the threads that need it then, so that it lies near them.
+        let unsought = |_: &S::Item| Sought { found: nothing(), is_done: false };
+        let mut sought: Vec<_> = self.threads.install(|| items.par_iter().with_min_len(TASK).map(unsought).collect());
         let demand: Vec<AtomicU32> = (0..count).map(|_| AtomicU32::new(0)).collect();
         let (mut is_done, done, mut told) = (vec![false; count as usize], AtomicU64::new(0), 0);
         let mut at_hand: Vec<(u32, Arc<[u8]>)> =
@@ -177,7 +178,8 @@ impl Queries {
             };
             let mut wanted: Vec<_> = (0..count).zip(&demand).filter_map(asked_for).collect();
             if wanted.is_empty() {
-                return Ok(sought.into_iter().map(|sought| sought.found).collect());
+                let found = |sought: Sought<S::Found>| sought.found;
+                return Ok(self.threads.install(|| sought.into_par_iter().with_min_len(TASK).map(found).collect()));
             }
             wanted.sort_unstable();
             let wanted: Vec<Item> = wanted.iter().map(|&(_, brick)| Item::geometry(brick)).collect();

@@ -354,6 +354,7 @@ impl fmt::Display for ImageSize {
 }
 
 /// Parses a whole number or count from `LEAST` to `MOST`.
+#[cfg(feature = "cli")]
 pub(crate) fn ranged<const LEAST: u32, const MOST: u32>(text: &str) -> Result<u32, String> {
     let found = u32::try_from(count(text)?).ok().filter(|n| (LEAST..=MOST).contains(n));
     found.ok_or_else(|| format!("it must be from {LEAST} to {MOST}"))

@@ -60,6 +60,22 @@ fn append<const N: usize, T: Copy + Into<f64>, R>(
     }
 }
 
+/// Whether all numbers of `rows`, of which `N` make one, are finite, and `has` holds for each row. Of rows that do not
+/// lie one after the other it is not said.
+fn are_plain<const N: usize, T: Copy + Into<f64>>(
+    view: ArrayView2<T>,
+    rows: Range<usize>,
+    has: impl Fn([f64; N]) -> bool,
+) -> bool {
+    let Some(numbers) = view.as_slice().and_then(|all| all.get(rows.start * N..rows.end * N)) else { return false };
+    let (rows, _) = numbers.as_chunks();
+    // Without branches, of which compilers make vectors.
+    rows.iter().fold(true, |all, row| {
+        let row: [f64; N] = row.map(T::into);
+        all & row.iter().fold(true, |all, x| all & x.is_finite()) & has(row)
+    })
+}
+
 impl<'py> Rows<'py> {
     /// The array.
     ///
@@ -101,6 +117,30 @@ impl<'py> Rows<'py> {
             Self::Double(array) => append(array.try_readonly().map_err(changed)?.as_array(), rows, make, to),
         }
         Ok(())
+    }
+
+    /// Whether it is plain of `rows` of `N` numbers that all are finite and that `has` holds.
+    fn are_plain<const N: usize>(&self, rows: Range<usize>, has: impl Fn([f64; N]) -> bool) -> bool {
+        self.shape().1 == N
+            && match self {
+                Self::Single(array) => array.try_readonly().is_ok_and(|array| are_plain(array.as_array(), rows, has)),
+                Self::Double(array) => array.try_readonly().is_ok_and(|array| are_plain(array.as_array(), rows, has)),
+            }
+    }
+
+    /// Whether it is plain that `rows` are rays without an interval of their own.
+    pub fn are_rays(&self, rows: Range<usize>) -> bool {
+        self.are_plain(rows, |[_, _, _, x, y, z]| (x != 0.0) | (y != 0.0) | (z != 0.0))
+    }
+
+    /// Whether it is plain that `rows` are points.
+    pub fn are_points(&self, rows: Range<usize>) -> bool {
+        self.are_plain(rows, |_: [f64; 3]| true)
+    }
+
+    /// Whether it is plain that `rows` are pairs of points.
+    pub fn are_pairs(&self, rows: Range<usize>) -> bool {
+        self.are_plain(rows, |_: [f64; 6]| true)
     }
 
     /// Appends rays: origin, direction, and where there are eight columns the least and the greatest distance.

@@ -5,7 +5,7 @@ use crate::held::{self, Done, Held, Options, Shared};
 use crate::query;
 use crate::render;
 use crate::rows::{Named, Rows, bad_pair, bad_point, bad_ray};
-use crate::worker::{Desk, Progress, Task, Worker, run_alone};
+use crate::worker::{Desk, Pending, Progress, Task, Worker, run_alone};
 use anyhow::Result;
 use bricks::SceneFile;
 use brickwalk::counters::Counters;
@@ -26,6 +26,9 @@ const CHECKED: usize = 1 << 10;
 /// Rows after which signals are asked for, a multiple of those.
 const BETWEEN: usize = 1 << 20;
 
+/// Most rows of a job beside which another may wait; of more, both would take much memory.
+const BESIDE: usize = 1 << 18;
+
 /// A scene that is open. Threads may share it: their jobs are done in turn.
 #[pyclass(frozen, module = "brickwalk._brickwalk")]
 pub struct Core {
@@ -36,6 +39,8 @@ pub struct Core {
     worker: Mutex<Option<Worker<Held>>>,
 }
 
+/// Whether it is plain that nothing is wrong with rows; else they are looked at one by one.
+type Fine<'py> = fn(&Rows<'py>, Range<usize>) -> bool;
 /// Says of items that begin at a row which is the first that is none, and why.
 type Bad<R> = fn(usize, &[R], &Named) -> Option<String>;
 /// Appends some of the rows.
@@ -46,6 +51,7 @@ struct Job<'py, 'a, R> {
     rows: Rows<'py>,
     named: Named,
     progress: Told<'py>,
+    fine: Fine<'py>,
     bad: Bad<R>,
     read: Read<'py, R>,
     core: &'a Core,
@@ -65,23 +71,34 @@ impl<'py, R: Send + 'static> Job<'py, '_, R> {
         // Nothing is done before all is known to be good.
         let mut near = Vec::with_capacity(CHECKED);
         for start in (0..count).step_by(CHECKED) {
-            near.clear();
-            (self.read)(&self.rows, part(start, CHECKED), &mut near)?;
-            (self.bad)(start, &near, &self.named).map_or(Ok(()), |text| Err(wrong(text)))?;
+            if !(self.fine)(&self.rows, part(start, CHECKED)) {
+                near.clear();
+                (self.read)(&self.rows, part(start, CHECKED), &mut near)?;
+                (self.bad)(start, &near, &self.named).map_or(Ok(()), |text| Err(wrong(text)))?;
+            }
             if start % BETWEEN == 0 {
                 py.check_signals()?;
             }
         }
         let mut progress = Progress::new(self.progress, count as u64);
         let most = desk.run(py, &mut progress, |held, _| held.begin())?;
+        let mut finish = |(part, pending): (Range<usize>, Pending<T>)| {
+            take(part.start, pending.wait(py, &mut progress)?)?;
+            progress.reached(part.end as u64)
+        };
+        // While the scene's thread works on some, what is known of those before is written and the next are read.
+        let mut last = None;
         for start in (0..count).step_by(most) {
+            if most > BESIDE {
+                last.take().map_or(Ok(()), &mut finish)?;
+            }
             let (part, mut given) = (part(start, most), Vec::new());
             given.reserve_exact(part.len());
             (self.read)(&self.rows, part.clone(), &mut given)?;
-            take(start, desk.run(py, &mut progress, move |held, task| work(held, &given, task))?)?;
-            progress.reached(part.end as u64)?;
+            let pending = desk.begin(py, move |held, task| work(held, &given, task))?;
+            last.replace((part, pending)).map_or(Ok(()), &mut finish)?;
         }
-        Ok(())
+        last.map_or(Ok(()), finish)
     }
 }
 
@@ -109,8 +126,8 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<Job<'py, '_, Ray>> {
         let (rows, named) = (Rows::of(rows)?, Named { name: "ray", shape });
-        let (bad, read): (Bad<Ray>, Read<'py, Ray>) = (bad_ray, Rows::rays);
-        Ok(Job { rows, named, progress, bad, read, core: self })
+        let (fine, bad, read): (Fine<'py>, Bad<_>, Read<'py, _>) = (Rows::are_rays, bad_ray, Rows::rays);
+        Ok(Job { rows, named, progress, fine, bad, read, core: self })
     }
 
     fn points<'py>(
@@ -120,8 +137,8 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<Job<'py, '_, [f64; 3]>> {
         let (rows, named) = (Rows::of(rows)?, Named { name: "point", shape });
-        let (bad, read): (Bad<[f64; 3]>, Read<'py, [f64; 3]>) = (bad_point, Rows::points);
-        Ok(Job { rows, named, progress, bad, read, core: self })
+        let (fine, bad, read): (Fine<'py>, Bad<_>, Read<'py, _>) = (Rows::are_points, bad_point, Rows::points);
+        Ok(Job { rows, named, progress, fine, bad, read, core: self })
     }
 }
 
@@ -415,8 +432,8 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<()> {
         let (rows, named) = (Rows::of(pairs)?, Named { name: "pair", shape });
-        let (bad, read): (Bad<_>, Read<'py, _>) = (bad_pair, Rows::pairs);
-        let job = Job { rows, named, progress, bad, read, core: self };
+        let (fine, bad, read): (Fine<'py>, Bad<_>, Read<'py, _>) = (Rows::are_pairs, bad_pair, Rows::pairs);
+        let job = Job { rows, named, progress, fine, bad, read, core: self };
         let take = |start, found: Vec<bool>| write(free, start, found.into_iter());
         job.run(py, query::visibility, take)
     }

@@ -187,19 +187,30 @@ pub struct Desk<S> {
 }
 
 impl<S: State> Desk<S> {
-    /// Has the worker do `work`, and waits for it without holding Python's lock. What a person should know of a scene
-    /// by URL is a warning of Python's.
+    /// Has the worker do `work`, and waits for it, as of [`Pending::wait`].
     ///
     /// # Errors
-    /// That of `work`; what a signal or `progress` raises: the job then ends as soon as it can.
+    /// As of [`Pending::wait`].
     pub fn run<T: Send + 'static>(
         &self,
         py: Python<'_>,
         progress: &mut Progress,
         work: impl FnOnce(&mut S, &Arc<Task>) -> Result<T> + Send + 'static,
     ) -> PyResult<T> {
+        self.begin(py, work)?.wait(py, progress)
+    }
+
+    /// Gives the worker `work`, which it does after what it was given before.
+    ///
+    /// # Errors
+    /// What a signal raises; the worker has ended.
+    pub fn begin<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut S, &Arc<Task>) -> Result<T> + Send + 'static,
+    ) -> PyResult<Pending<T>> {
         py.check_signals()?;
-        let (sender, mut receiver) = channel();
+        let (sender, receiver) = channel();
         let task = Arc::new(Task::default());
         let its = task.clone();
         let job = move |state: &mut S| {
@@ -208,15 +219,35 @@ impl<S: State> Desk<S> {
             let _ = sender.send(result);
         };
         self.jobs.send(Box::new(job)).map_err(|_| failed("the scene's thread has ended"))?;
+        Ok(Pending { receiver, task })
+    }
+}
+
+/// A job that a worker has. Dropped, it ends as soon as it can.
+pub struct Pending<T> {
+    receiver: Receiver<Result<T>>,
+    task: Arc<Task>,
+}
+
+impl<T> Drop for Pending<T> {
+    fn drop(&mut self) {
+        self.task.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+impl<T: Send> Pending<T> {
+    /// Waits for what the job returns without holding Python's lock. What a person should know of a scene by URL is a
+    /// warning of Python's.
+    ///
+    /// # Errors
+    /// The job's; what a signal or `progress` raises.
+    pub fn wait(mut self, py: Python<'_>, progress: &mut Progress) -> PyResult<T> {
         let result = loop {
-            match wait(py, &mut receiver) {
+            match wait(py, &mut self.receiver) {
                 Ok(result) => break result,
                 Err(RecvTimeoutError::Disconnected) => return Err(failed("the scene's thread has ended")),
                 Err(RecvTimeoutError::Timeout) => {
-                    if let Err(error) = py.check_signals().and_then(|()| progress.tell(&task)) {
-                        task.stop.store(true, Ordering::Relaxed);
-                        return Err(error);
-                    }
+                    py.check_signals().and_then(|()| progress.tell(&self.task))?;
                 }
             }
         };

@@ -183,3 +183,26 @@ def test_progress_is_told(scene, rays):
     with pytest.raises(KeyError, match="no more"):
         scene.cast_rays(rays, progress=fails)
     assert scene.cast_rays(rays)["t"].shape == (120,)
+
+
+def test_batches_beside_each_other_change_nothing(scene):
+    rays, told = meshes.random_rays(200_000, seed=9), []
+    together = scene.cast_rays(rays, progress=lambda done, total: told.append((done, total)))
+    assert told == sorted(told) and len(told) > 2 and told[-1] == (200_000, 200_000)
+    apart = [scene.cast_rays(rays[first : first + 33_333]) for first in range(0, 200_000, 33_333)]
+    for name in KINDS:
+        np.testing.assert_array_equal(together[name], np.concatenate([part[name] for part in apart]))
+
+    def fails(done, total):
+        if done > 65_536:
+            raise KeyError("no more")
+
+    with pytest.raises(KeyError, match="no more"):
+        scene.cast_rays(rays, progress=fails)
+    np.testing.assert_array_equal(scene.cast_rays(rays)["t"], together["t"])
+    # Nothing is written where one of the last is bad.
+    out = {"t": np.full(200_000, 7.0)}
+    rays[199_999, 3:] = 0
+    with pytest.raises(ValueError, match="ray 199999: the direction has no length"):
+        scene.cast_rays(rays, out=out)
+    assert (out["t"] == 7).all()
