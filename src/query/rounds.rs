@@ -178,8 +178,8 @@ impl Queries {
             };
             let mut wanted: Vec<_> = (0..count).zip(&demand).filter_map(asked_for).collect();
             if wanted.is_empty() {
-                let found = |sought: Sought<S::Found>| sought.found;
-                return Ok(self.threads.install(|| sought.into_par_iter().with_min_len(TASK).map(found).collect()));
+                // In place: of many items a second list would take much memory.
+                return Ok(sought.into_iter().map(|sought| sought.found).collect());
             }
             wanted.sort_unstable();
             let wanted: Vec<Item> = wanted.iter().map(|&(_, brick)| Item::geometry(brick)).collect();
