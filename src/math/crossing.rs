@@ -127,6 +127,7 @@ impl Exact {
 /// Where `line`, which meets a triangle, does so: by its plane, from edges that are rounded once and not from vertices
 /// far from each other. `None` where the triangle is seen so much from its side, or is so small or narrow, that f64 has
 /// less than 40 bits of t or 30 of the weights.
+#[inline(always)]
 fn by_plane(line: &Line, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
     let [a, b, c] = triangle.map(DVec3::from);
     let d = DVec3::from(line.direction);
@@ -184,37 +185,62 @@ fn surely_meets(line: &Line, reach: f64, [a, b, c]: [DVec3; 3]) -> Option<bool> 
     (is_known && (least > error || greatest < -error)).then_some(true)
 }
 
-/// Eight lines whose references are 0, side by side.
-pub struct Lines {
+/// Lines whose references are 0, side by side.
+pub struct Lines<const N: usize> {
     /// By axes.
-    origin: [[f64; 8]; 3],
-    direction: [[f64; 8]; 3],
+    pub origin: [[f64; N]; 3],
+    /// By axes.
+    pub direction: [[f64; N]; 3],
     /// Greatest magnitudes of the origins' components.
-    reach: [f64; 8],
+    reach: [f64; N],
     /// Sums of the magnitudes of the directions' components.
-    length: [f64; 8],
+    length: [f64; N],
 }
 
-impl Lines {
-    /// `of` side by side.
+impl<const N: usize> Lines<N> {
+    /// Of origins and directions, by axes.
     #[inline(always)]
-    pub fn new(of: [&Line; 8]) -> Self {
-        let mut lines = Self { origin: [[0.0; 8]; 3], direction: [[0.0; 8]; 3], reach: [0.0; 8], length: [0.0; 8] };
-        for (i, line) in of.into_iter().enumerate() {
-            for k in 0..3 {
-                (lines.origin[k][i], lines.direction[k][i]) = (line.origin[k], line.direction[k]);
+    pub fn new(origin: [[f64; N]; 3], direction: [[f64; N]; 3]) -> Self {
+        let (mut reach, mut length) = ([0.0f64; N], [0.0; N]);
+        for k in 0..3 {
+            for i in 0..N {
+                reach[i] = reach[i].max(origin[k][i].abs());
+                length[i] += direction[k][i].abs();
             }
-            lines.reach[i] = DVec3::from_array(line.origin).abs().max_element();
-            lines.length[i] = DVec3::from_array(line.direction).abs().element_sum();
         }
-        lines
+        Self { origin, direction, reach, length }
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn get(&self, i: usize) -> Lines<1> {
+        let axes = |of: &[[f64; N]; 3]| [[of[0][i]], [of[1][i]], [of[2][i]]];
+        Lines {
+            origin: axes(&self.origin),
+            direction: axes(&self.direction),
+            reach: [self.reach[i]],
+            length: [self.length[i]],
+        }
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn line(&self, i: usize) -> Line {
+        let axes = |of: &[[f64; N]; 3]| [of[0][i], of[1][i], of[2][i]];
+        Line { reference: [0.0; 3], origin: axes(&self.origin), direction: axes(&self.direction) }
+    }
+
+    /// The greatest magnitude of its origin's components.
+    #[inline(always)]
+    pub fn reach(&self, i: usize) -> f64 {
+        self.reach[i]
     }
 
     /// Which lines certainly do not meet the triangle, a bit each, as decided for a line alone.
     #[inline(always)]
     pub fn surely_miss(&self, [a, b, c]: [DVec3; 3]) -> u32 {
         let greatest = a.abs().max(b.abs()).max(c.abs()).max_element();
-        let mut misses = [0; 8];
+        let mut misses = [0; N];
         for (i, miss) in misses.iter_mut().enumerate() {
             let [ox, oy, oz] = [self.origin[0][i], self.origin[1][i], self.origin[2][i]];
             let [dx, dy, dz] = [self.direction[0][i], self.direction[1][i], self.direction[2][i]];
@@ -230,7 +256,7 @@ impl Lines {
             let is_below = (u < -error) | (v < -error) | (w < -error);
             *miss = u64::from(is_above & is_below);
         }
-        (0..8).fold(0, |mask, i| mask | (misses[i] as u32) << i)
+        (0..N).fold(0, |mask, i| mask | (misses[i] as u32) << i)
     }
 }
 
@@ -256,8 +282,12 @@ pub fn crossing(line: &Line, triangle: [[f64; 3]; 3]) -> Option<Crossing> {
 }
 
 /// Where `line` meets a triangle that it is certain to meet, but not along an edge.
+#[inline(always)]
 fn met(line: &Line, triangle: [[f64; 3]; 3]) -> Crossing {
-    by_plane(line, triangle).unwrap_or_else(|| Exact::new(line, triangle).met())
+    by_plane(line, triangle).unwrap_or_else(
+        #[cold]
+        || Exact::new(line, triangle).met(),
+    )
 }
 
 /// The order of two crossings of one ray along it, exactly.
@@ -304,7 +334,8 @@ mod tests {
             }
             last.push(line);
             if let Ok(lines) = <[Line; 8]>::try_from(&*last) {
-                let misses = Lines::new(lines.each_ref()).surely_miss([a, b, c]);
+                let axes = |of: fn(&Line) -> [f64; 3]| [0, 1, 2].map(|k| lines.each_ref().map(|line| of(line)[k]));
+                let misses = Lines::new(axes(|line| line.origin), axes(|line| line.direction)).surely_miss([a, b, c]);
                 for (k, line) in lines.iter().enumerate() {
                     let reach = DVec3::from_array(line.origin).abs().max_element();
                     let is_missed = surely_meets(line, reach, [a, b, c]) == Some(false);

@@ -1,12 +1,13 @@
 //! What rays meet first, or whether they meet anything: each from brick to brick, the nearest first.
 
 use super::aim::Aim;
+use super::aims::Aims;
 use super::hits::normal;
-use super::packet::{MANY, Packet};
+use super::packet::{ALL, MANY, Packet};
 use super::room::{Inner, Room};
 use super::rounds::{Bricks, Seek, State};
 use super::space::Placed;
-use super::{Queries, Watch};
+use super::{Queries, Rays, Watch};
 use crate::kernels::layout::NONE;
 use crate::kernels::opacity;
 use crate::kernels::simd::isa::Isa;
@@ -20,6 +21,7 @@ use rayon::prelude::*;
 /// Rays that look for what they meet.
 struct Casting<'a> {
     queries: &'a Queries,
+    rays: Rays<'a>,
     /// Whether anything will do.
     any: bool,
     /// Whether rays pass through what materials cut out or let shine through.
@@ -48,15 +50,37 @@ fn drawn(ray: &Ray, id: u32) -> f32 {
     (bits >> 8) as f32 / (1u32 << 24) as f32
 }
 
+/// Rays that are set up.
+struct Ready {
+    aims: Aims<MANY>,
+    /// The number of the first.
+    first: usize,
+}
+
 impl Seek for Casting<'_> {
-    type Item = Ray;
+    type Ready = Ready;
 
     type Found = Found;
 
     #[inline(always)]
-    fn go<I: Isa>(&self, isa: I, ray: &Ray, found: &mut Found, bricks: &Bricks, room: &mut Room) -> Option<u32> {
+    fn ready<I: Isa>(&self, _: I, first: usize) -> Ready {
+        Ready { aims: Aims::new(self.queries.top(), &self.rays.columns(first)), first }
+    }
+
+    #[inline(always)]
+    fn go<I: Isa>(
+        &self,
+        isa: I,
+        (ready, i): (&Ready, usize),
+        found: &mut Found,
+        bricks: &Bricks,
+        room: &mut Room,
+    ) -> Option<u32> {
         let (top, resident) = (self.queries.top(), self.queries.scene.resident());
-        let aim = Aim::new(top, ray)?;
+        let (number, aim) = (ready.first + i, ready.aims.get(i));
+        if aim.come == 0 {
+            return None;
+        }
         // The nearest brick that is away, and where it is entered.
         let mut next = (f64::INFINITY, NONE);
         let Room { top: open, inner, .. } = room;
@@ -66,19 +90,19 @@ impl Seek for Casting<'_> {
             open,
             #[inline(always)]
             |leaf, from| {
-                let number = resident.leaves[leaf as usize].brick;
-                match bricks.get(number) {
+                let its = resident.leaves[leaf as usize].brick;
+                match bricks.get(its) {
                     State::AtHand(geometry) => {
                         let brick = Placed::new(resident, leaf, geometry);
-                        self.go_through(isa, (ray, &aim), (leaf, &brick), from, found, inner);
+                        self.go_through(isa, (number, &aim), (leaf, &brick), from, found, inner);
                     }
-                    State::Away if from < next.0 => next = (from, number),
+                    State::Away if from < next.0 => next = (from, its),
                     _ => (),
                 }
-                self.end(&aim, found)
+                self.end(&aim, 0, found)
             },
         );
-        let matters = next.1 != NONE && aim.may_enter(next.0, self.end(&aim, found));
+        let matters = next.1 != NONE && aim.may_enter(next.0, self.end(&aim, 0, found));
         matters.then_some(next.1)
     }
 
@@ -86,14 +110,14 @@ impl Seek for Casting<'_> {
     fn go_together<I: Isa>(
         &self,
         isa: I,
-        rays: &[Ray; MANY],
-        mut found: [&mut Found; MANY],
+        Ready { aims, first }: &Ready,
+        found: &mut [Found; MANY],
         bricks: &Bricks,
         room: &mut Room,
     ) -> u32 {
         let (top, resident) = (self.queries.top(), self.queries.scene.resident());
-        let Some(packet) = Packet::new(top, rays) else { return u32::MAX };
-        let (mut alone, t) = (0, self.ends(&packet, &found));
+        let Some(packet) = Packet::new(top, aims) else { return ALL };
+        let (mut alone, t) = (0, self.ends(aims, found));
         let Room { joint, inner, .. } = room;
         packet.leaves(
             isa,
@@ -105,7 +129,7 @@ impl Seek for Casting<'_> {
                 match bricks.get(resident.leaves[leaf as usize].brick) {
                     State::AtHand(geometry) => {
                         let brick = Placed::new(resident, leaf, geometry);
-                        let t = self.ends(&packet, &found);
+                        let t = self.ends(aims, found);
                         let went = packet.triangles(
                             isa,
                             &brick,
@@ -114,25 +138,26 @@ impl Seek for Casting<'_> {
                             t,
                             #[inline(always)]
                             |triangle, vertices, i| {
-                                let (aim, found) = (&packet.aims[i], &mut *found[i]);
+                                let found = &mut found[i];
                                 // Who needs no more has nothing before its end.
                                 if !self.is_met(found) {
-                                    self.meet((&rays[i], aim), (leaf, &brick), (triangle, vertices), found);
+                                    let met = aims.meet(i, vertices);
+                                    self.note(met, first + i, (leaf, &brick), (triangle, vertices), found);
                                 }
-                                self.end(aim, found)
+                                self.end(aims, i, found)
                             },
                         );
                         let mut left = if went { 0 } else { who };
                         while left != 0 {
                             let i = left.trailing_zeros() as usize;
                             left &= left - 1;
-                            self.go_through(isa, (&rays[i], &packet.aims[i]), (leaf, &brick), from, found[i], inner);
+                            self.go_through(isa, (first + i, &aims.get(i)), (leaf, &brick), from, &mut found[i], inner);
                         }
                     }
                     State::Away => alone |= who,
                     State::Done => (),
                 }
-                self.ends(&packet, &found)
+                self.ends(aims, found)
             },
         );
         alone
@@ -148,50 +173,52 @@ impl Casting<'_> {
 
     /// Up to where a ray may still meet what matters.
     #[inline(always)]
-    fn end(&self, aim: &Aim, found: &Found) -> f64 {
-        if self.is_met(found) { f64::NEG_INFINITY } else { found.t.min(aim.t_max) }
+    fn end<const N: usize>(&self, aims: &Aims<N>, i: usize, found: &Found) -> f64 {
+        if self.is_met(found) { f64::NEG_INFINITY } else { found.t.min(aims.t_max[i]) }
     }
 
     /// The same of rays that go together.
     #[inline(always)]
-    fn ends(&self, packet: &Packet, found: &[&mut Found; MANY]) -> [f64; MANY] {
+    fn ends(&self, aims: &Aims<MANY>, found: &[Found; MANY]) -> [f64; MANY] {
         let mut ends = [0.0; MANY];
         for i in 0..MANY {
-            ends[i] = self.end(&packet.aims[i], found[i]);
+            ends[i] = self.end(aims, i, &found[i]);
         }
         ends
     }
 
-    /// Has a ray meet a triangle.
+    /// Notes what the ray of a number has met, if it has: a triangle.
     #[inline(always)]
-    fn meet(
+    fn note(
         &self,
-        (ray, aim): (&Ray, &Aim),
+        met: Option<Crossing>,
+        number: usize,
         (leaf, brick): (u32, &Placed),
         (triangle, vertices): (u32, [DVec3; 3]),
         found: &mut Found,
     ) {
-        if let Some(Crossing { t, weights, .. }) = aim.meet(vertices) {
+        let Some(Crossing { t, weights, .. }) = met else { return };
+        // Of what is as near, the lowest id.
+        if t < found.t || t == found.t && brick.id(triangle) < found.id {
             let (id, weights) = (brick.id(triangle), weights.map(|weight| weight as f32));
-            // Of what is as near, the lowest id.
-            if (t, id) < (found.t, found.id) && !self.passes(ray, brick, triangle, id, weights) {
+            if !self.passes(number, brick, triangle, id, weights) {
                 *found = Found { t, id, leaf, triangle, weights, normal: normal(vertices) };
             }
         }
     }
 
-    /// Has a ray meet what there is in a brick.
+    /// Has the ray of a number meet what there is in a brick.
     #[inline(always)]
     fn go_through<I: Isa>(
         &self,
         isa: I,
-        (ray, aim): (&Ray, &Aim),
+        (number, aim): (usize, &Aim),
         (leaf, brick): (u32, &Placed),
         from: f64,
         found: &mut Found,
         room: &mut Inner,
     ) {
-        let limit = found.t.min(aim.t_max);
+        let limit = found.t.min(aim.t_max[0]);
         aim.triangles(
             isa,
             brick,
@@ -199,16 +226,18 @@ impl Casting<'_> {
             room,
             #[inline(always)]
             |triangle| {
-                self.meet((ray, aim), (leaf, brick), (triangle, brick.vertices(triangle)), found);
-                (!self.is_met(found)).then_some(found.t.min(aim.t_max))
+                let vertices = brick.vertices(triangle);
+                self.note(aim.meet(0, vertices), number, (leaf, brick), (triangle, vertices), found);
+                (!self.is_met(found)).then_some(found.t.min(aim.t_max[0]))
             },
         );
     }
 
     #[inline(always)]
-    fn passes(&self, ray: &Ray, brick: &Placed, triangle: u32, id: u32, weights: [f32; 3]) -> bool {
+    fn passes(&self, number: usize, brick: &Placed, triangle: u32, id: u32, weights: [f32; 3]) -> bool {
         let opacity = &brick.geometry.view.opacity;
-        self.passes && !opacity.of.is_empty() && opacity.passes(triangle, weights, false, || drawn(ray, id))
+        let draw = || drawn(&self.rays.get(number), id);
+        self.passes && !opacity.of.is_empty() && opacity.passes(triangle, weights, false, draw)
     }
 }
 
@@ -218,8 +247,8 @@ impl Queries {
     ///
     /// # Errors
     /// A ray that is none, by its number; a damaged brick; what `watch` says.
-    pub fn cast(&self, rays: &[Ray], watch: &mut Watch) -> Result<Vec<Hit>> {
-        let found = self.find(rays, (false, true), watch)?;
+    pub fn cast<'a>(&self, rays: impl Into<Rays<'a>>, watch: &mut Watch) -> Result<Vec<Hit>> {
+        let found = self.find(rays.into(), (false, true), watch)?;
         let of = |found: &Found| (found.leaf, found.triangle);
         let rotations = self.rotations(&found, of)?;
         let hit = |(found, rotation): (&Found, u8)| {
@@ -233,20 +262,21 @@ impl Queries {
     ///
     /// # Errors
     /// As of [`Queries::cast`].
-    pub fn any(&self, rays: &[Ray], watch: &mut Watch) -> Result<Vec<bool>> {
-        self.meets_any(rays, true, watch)
+    pub fn any<'a>(&self, rays: impl Into<Rays<'a>>, watch: &mut Watch) -> Result<Vec<bool>> {
+        self.meets_any(rays.into(), true, watch)
     }
 
     /// Whether each ray meets anything; with `passes` anything that it does not pass through.
-    pub(super) fn meets_any(&self, rays: &[Ray], passes: bool, watch: &mut Watch) -> Result<Vec<bool>> {
+    pub(super) fn meets_any(&self, rays: Rays, passes: bool, watch: &mut Watch) -> Result<Vec<bool>> {
         let found = self.find(rays, (true, passes), watch)?;
         Ok(self.threads.install(|| found.par_iter().map(|found| found.id != NONE).collect()))
     }
 
-    fn find(&self, rays: &[Ray], (any, passes): (bool, bool), watch: &mut Watch) -> Result<Vec<Found>> {
+    fn find(&self, rays: Rays, (any, passes): (bool, bool), watch: &mut Watch) -> Result<Vec<Found>> {
         self.check_rays(rays)?;
         let has_opacity = passes && opacity::is_needed(self.scene.resident());
         let opacity = if has_opacity { opacity::table(&self.scene)? } else { Vec::new() };
-        self.seek(&Casting { queries: self, any, passes }, rays, || NOTHING, &opacity, watch)
+        let casting = Casting { queries: self, rays, any, passes };
+        self.seek(&casting, rays.len(), || NOTHING, &opacity, watch)
     }
 }

@@ -15,8 +15,10 @@
 //! | occupancy, signed distance | `inside.rs`: winding along an axis; `closed.rs` says whether it has a meaning |
 
 mod aim;
+mod aims;
 mod cast;
 mod closed;
+mod given;
 mod hits;
 mod inside;
 mod near;
@@ -35,9 +37,10 @@ mod walk;
 mod tests;
 
 pub use closed::Surface;
+pub use given::Rays;
 
 use crate::cpu::available_memory;
-use crate::output::npy::{Hit, Ray};
+use crate::output::npy::Hit;
 use crate::session::trace::check;
 use crate::settings::CacheSize;
 use anyhow::{Context, Result, bail};
@@ -59,6 +62,9 @@ const BATCH: usize = 1 << 22;
 
 /// And where none has: what is known of so many stays in a processor's own caches.
 const NEAR_BATCH: usize = 1 << 16;
+
+/// Rays that are checked at a time.
+const CHECKED: usize = 1 << 12;
 
 /// Is told how many more items are done; 0 says that work goes on. An error ends the work and is handed back.
 pub type Watch<'a> = dyn FnMut(u64) -> Result<()> + 'a;
@@ -149,10 +155,11 @@ impl Queries {
     }
 
     /// Refuses rays that are none.
-    fn check_rays(&self, rays: &[Ray]) -> Result<()> {
-        let is_bad = |(number, ray): (usize, &Ray)| Some((number, check(ray).err()?));
-        let bad = self.threads.install(|| rays.par_iter().enumerate().find_map_first(is_bad));
-        bad.map_or(Ok(()), |(number, error)| Err(error).with_context(|| format!("ray {number}")))
+    fn check_rays(&self, rays: Rays) -> Result<()> {
+        let parts = (0..rays.len().div_ceil(CHECKED)).into_par_iter();
+        let bad_in = |part: usize| rays.first_bad(part * CHECKED, rays.len().min((part + 1) * CHECKED));
+        let bad = self.threads.install(|| parts.find_map_first(bad_in));
+        bad.map_or(Ok(()), |number| check(&rays.get(number)).with_context(|| format!("ray {number}")))
     }
 
     /// What was read and held so far.

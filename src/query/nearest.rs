@@ -116,20 +116,36 @@ impl Best {
 }
 
 /// Points that look for what is nearest.
-struct Nearest<'a>(&'a Queries);
+struct Nearest<'a> {
+    queries: &'a Queries,
+    points: &'a [[f64; 3]],
+}
 
 impl Seek for Nearest<'_> {
-    type Item = [f64; 3];
+    /// Where they begin.
+    type Ready = usize;
 
     type Found = Best;
 
     #[inline(always)]
-    fn go<I: Isa>(&self, isa: I, point: &[f64; 3], best: &mut Best, bricks: &Bricks, room: &mut Room) -> Option<u32> {
-        let (resident, point) = (self.0.scene.resident(), DVec3::from_array(*point));
+    fn ready<I: Isa>(&self, _: I, first: usize) -> usize {
+        first
+    }
+
+    #[inline(always)]
+    fn go<I: Isa>(
+        &self,
+        isa: I,
+        (&first, i): (&usize, usize),
+        best: &mut Best,
+        bricks: &Bricks,
+        room: &mut Room,
+    ) -> Option<u32> {
+        let (resident, point) = (self.queries.scene.resident(), DVec3::from_array(self.points[first + i]));
         let Room { top, inner, .. } = room;
         // The nearest brick that is away, and how near it is at least.
         let mut next = (f64::INFINITY, NONE);
-        self.0.top().near_leaves(
+        self.queries.top().near_leaves(
             isa,
             point,
             best.distance_squared,
@@ -154,7 +170,7 @@ impl Seek for Nearest<'_> {
 impl Queries {
     fn nearest(&self, points: &[[f64; 3]], watch: &mut Watch) -> Result<Vec<Best>> {
         super::check_points(points)?;
-        self.seek(&Nearest(self), points, || NOTHING, &[], watch)
+        self.seek(&Nearest { queries: self, points }, points.len(), || NOTHING, &[], watch)
     }
 
     /// The distance of each of `points` from the scene, world units; +inf in a scene without triangles.

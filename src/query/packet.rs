@@ -4,21 +4,22 @@
 //! Such rays enter much the same boxes. A box in eight lanes costs about as much as one node by a ray alone, but what a
 //! walk waits for most, memory and branches that turn out otherwise, is there once for eight.
 
-use super::aim::{Aim, Local};
+use super::aims::{Aims, Locals, Told};
 use super::room::Joint;
 use super::space::{Geometry, Placed};
 use super::top::Top;
 use super::walk::{Open, child, elements};
 use crate::kernels::simd::isa::Isa;
-use crate::kernels::simd::wide::Wide;
-use crate::math::crossing::Lines;
-use crate::output::npy::Ray;
+use crate::kernels::simd::wide::{Wide, three};
 use bricks::Node;
 use glam::DVec3;
 use std::ops::Range;
 
 /// Rays that go together.
 pub(super) const MANY: usize = 8;
+
+/// All of them, a bit each.
+pub(super) const ALL: u32 = (1 << MANY) - 1;
 
 /// By how much the components of their directions differ at most, of the greatest.
 const TURNED: f64 = 1.0 / 32.0;
@@ -29,113 +30,43 @@ const APART: f64 = 1.0 / 64.0;
 /// So many rays at least go through a brick together.
 const LEAST: u32 = 3;
 
-/// The expression for every ray. No closure, as of [`three`](crate::kernels::simd::wide::three).
-macro_rules! eight {
-    ($i:ident => $x:expr) => {
-        [
-            {
-                let $i = 0usize;
-                $x
-            },
-            {
-                let $i = 1usize;
-                $x
-            },
-            {
-                let $i = 2usize;
-                $x
-            },
-            {
-                let $i = 3usize;
-                $x
-            },
-            {
-                let $i = 4usize;
-                $x
-            },
-            {
-                let $i = 5usize;
-                $x
-            },
-            {
-                let $i = 6usize;
-                $x
-            },
-            {
-                let $i = 7usize;
-                $x
-            },
-        ]
-    };
-}
-
 /// Rays on their way together.
-pub(super) struct Packet {
-    pub(super) aims: [Aim; MANY],
-    lines: Lines,
-    /// Inverses of directions, by axes; of the same signs.
-    inverse: [[f32; MANY]; 3],
+pub(super) struct Packet<'a> {
+    aims: &'a Aims<MANY>,
+    /// Of all directions.
     is_negative: [bool; 3],
 }
 
-/// The rays in a frame, as [`Local`].
-struct Locals {
-    ahead: [[f32; MANY]; 3],
-    behind: [[f32; MANY]; 3],
-    t_min: [f32; MANY],
-    /// Of one of them: distances are told alike for all.
-    one: Local,
-}
-
-impl Locals {
-    #[inline(always)]
-    fn new(of: [Local; MANY]) -> Self {
-        let (mut ahead, mut behind) = ([[0.0; MANY]; 3], [[0.0; MANY]; 3]);
-        for k in 0..3 {
-            for i in 0..MANY {
-                (ahead[k][i], behind[k][i]) = (of[i].ahead[k], of[i].behind[k]);
-            }
-        }
-        let t_min = eight!(i => of[i].t_min);
-        let [one, ..] = of;
-        Self { ahead, behind, t_min, one }
-    }
-}
-
-impl Packet {
+impl<'a> Packet<'a> {
     /// `None`: the rays do not go much the same way, or not all of them come near the scene.
     #[inline(always)]
-    pub(super) fn new(top: &Top, rays: &[Ray; MANY]) -> Option<Self> {
-        let first = &rays[0];
-        let [origin, direction] = [first.origin, first.direction].map(DVec3::from_array);
-        let turned = TURNED * direction.abs().max_element();
-        let apart = APART * f64::from(top.extent) * top.frame.unit;
-        let is_alike = |ray: &Ray| {
-            let [own, way] = [ray.origin, ray.direction].map(DVec3::from_array);
-            (way - direction).abs().max_element() <= turned && (own - origin).abs().max_element() <= apart
-        };
-        if !rays[1..].iter().all(is_alike) {
+    pub(super) fn new(top: &Top, aims: &'a Aims<MANY>) -> Option<Self> {
+        if aims.come != ALL {
             return None;
         }
-        let aims = eight!(i => Aim::new(top, &rays[i])?);
-        let is_negative = aims[0].inverse.map(f32::is_sign_negative);
-        let mut inverse = [[0.0; MANY]; 3];
+        let (origin, direction) = (&aims.lines.origin, &aims.lines.direction);
+        let longest = three!(k => direction[k][0].abs()).into_iter().fold(0.0, f64::max);
+        let (turned, apart) = (TURNED * longest, APART * f64::from(top.extent) * top.frame.unit);
+        let is_negative = three!(k => aims.inverse[k][0].is_sign_negative());
+        let mut are_alike = true;
         for k in 0..3 {
             for i in 0..MANY {
-                inverse[k][i] = aims[i].inverse[k];
-                if inverse[k][i].is_sign_negative() != is_negative[k] {
-                    return None;
-                }
+                are_alike &= (direction[k][i] - direction[k][0]).abs() <= turned;
+                are_alike &= (origin[k][i] - origin[k][0]).abs() <= apart;
+                are_alike &= aims.inverse[k][i].is_sign_negative() == is_negative[k];
             }
         }
-        let lines = Lines::new(eight!(i => &aims[i].line));
-        Some(Self { lines, inverse, is_negative, aims })
+        are_alike.then_some(Self { aims, is_negative })
     }
 
     /// No less than distances along the rays of what is met at `t`, in a frame.
     #[inline(always)]
-    fn limits(&self, locals: &Locals, t: &[f64; MANY]) -> [f32; MANY] {
-        eight!(i => locals.one.above(self.aims[i].limit(t[i])))
+    fn limits(&self, told: &Told, t: &[f64; MANY]) -> [f32; MANY] {
+        let mut limits = [0.0; MANY];
+        for i in 0..MANY {
+            limits[i] = told.above(self.aims.limit(i, t[i]));
+        }
+        limits
     }
 
     /// Calls `visit` for the leaves of the top level that rays may enter up to `t`, with where at the earliest, and
@@ -150,17 +81,16 @@ impl Packet {
         mut visit: impl FnMut(u32, f64, u32) -> [f64; MANY],
     ) {
         let unit = top.frame.unit;
-        let locals =
-            Locals::new(eight!(i => self.aims[i].local((top.frame.origin, top.extent), top.per_unit, (0.0, top.step))));
-        let limits = self.limits(&locals, &t);
+        let locals = self.aims.locals((top.frame.origin, top.extent), top.per_unit, (0.0, top.step));
+        let limits = self.limits(&locals.told, &t);
         self.walk(
             isa,
             (&top.nodes, &locals),
-            (1 << MANY) - 1,
+            ALL,
             limits,
             open,
             #[inline(always)]
-            |leaf, near, who| self.limits(&locals, &visit(leaf.start, f64::from(near) * unit, who)),
+            |leaf, near, who| self.limits(&locals.told, &visit(leaf.start, f64::from(near) * unit, who)),
         );
     }
 
@@ -176,16 +106,17 @@ impl Packet {
         mut t: [f64; MANY],
         mut visit: impl FnMut(u32, [DVec3; 3], usize) -> f64,
     ) -> bool {
-        let is_known = self.aims.iter().all(
+        let is_known = (0..MANY).fold(
+            true,
             #[inline(always)]
-            |aim| aim.is_known(brick, from),
+            |all, i| all & self.aims.is_known(i, brick, from),
         );
         if who.count_ones() < LEAST || brick.matrix.is_some() || !is_known {
             return false;
         }
         let &Geometry { origin, per_unit, step, extent, .. } = brick.geometry;
-        let locals = Locals::new(eight!(i => self.aims[i].local((origin, extent), per_unit, (from, step))));
-        let mut limits = self.limits(&locals, &t);
+        let locals = self.aims.locals((origin, extent), per_unit, (from, step));
+        let mut limits = self.limits(&locals.told, &t);
         self.walk(
             isa,
             (brick.geometry.view.nodes, &locals),
@@ -196,14 +127,14 @@ impl Packet {
             |triangles, _, who| {
                 for triangle in triangles {
                     let vertices = brick.vertices(triangle);
-                    let mut left = who & !self.lines.surely_miss(vertices);
+                    let mut left = who & !self.aims.lines.surely_miss(vertices);
                     while left != 0 {
                         let ray = left.trailing_zeros() as usize;
                         left &= left - 1;
                         let now = visit(triangle, vertices, ray);
                         if now != t[ray] {
                             t[ray] = now;
-                            limits[ray] = locals.one.above(self.aims[ray].limit(now));
+                            limits[ray] = locals.told.above(self.aims.limit(ray, now));
                         }
                     }
                 }
@@ -219,7 +150,7 @@ impl Packet {
     fn walk<I: Isa>(
         &self,
         isa: I,
-        (nodes, locals): (&[Node], &Locals),
+        (nodes, locals): (&[Node], &Locals<MANY>),
         who: u32,
         mut limits: [f32; MANY],
         open: &mut Vec<Joint>,
@@ -265,13 +196,13 @@ impl Packet {
     fn ask<I: Isa>(
         &self,
         isa: I,
-        locals: &Locals,
+        locals: &Locals<MANY>,
         node: &Node,
         (limits, who): (&[f32; MANY], u32),
     ) -> (u32, [[f32; MANY]; 8], [u32; 8]) {
         let (mut nears, mut ends) = ([isa.load_eight(&locals.t_min); 8], [isa.load_eight(limits); 8]);
         for k in 0..3 {
-            let inverse = isa.load_eight(&self.inverse[k]);
+            let inverse = isa.load_eight(&self.aims.inverse[k]);
             let (scale, origin) =
                 (isa.eight(f32::from_bits(u32::from(node.exponent[k]) << 23)) * inverse, isa.eight(node.origin[k]));
             let ahead = (origin - isa.load_eight(&locals.ahead[k])) * inverse;

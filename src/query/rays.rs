@@ -6,7 +6,7 @@ use super::room::Room;
 use super::space::{Placed, Slabs};
 use super::sweep::Sweep;
 use super::top::Top;
-use super::{Intersections, Queries, Watch};
+use super::{Intersections, Queries, Rays, Watch};
 use crate::kernels::simd::isa::Isa;
 use crate::math::crossing::Crossing;
 use crate::output::npy::Ray;
@@ -32,19 +32,19 @@ fn meet<I: Isa>(
     room: &mut Room,
     mut visit: impl FnMut(u32, [DVec3; 3], &Crossing),
 ) {
-    let Some(aim) = Aim::new(top, ray) else { return };
+    let Some(aim) = Aim::alone(top, ray) else { return };
     aim.triangles(
         isa,
         brick,
-        (0.0, aim.t_max),
+        (0.0, aim.t_max[0]),
         &mut room.inner,
         #[inline(always)]
         |triangle| {
             let vertices = brick.vertices(triangle);
-            if let Some(met) = aim.meet(vertices) {
+            if let Some(met) = aim.meet(0, vertices) {
                 visit(triangle, vertices, &met);
             }
-            Some(aim.t_max)
+            Some(aim.t_max[0])
         },
     );
 }
@@ -52,7 +52,7 @@ fn meet<I: Isa>(
 /// Rays that list what they meet.
 struct Listed<'a> {
     top: &'a Top,
-    rays: &'a [Ray],
+    rays: Rays<'a>,
 }
 
 impl Sweep for Listed<'_> {
@@ -61,13 +61,13 @@ impl Sweep for Listed<'_> {
     type Asks = Slabs;
 
     fn asks(&self, item: usize) -> Option<Slabs> {
-        Some(asks(&self.rays[item]))
+        Some(asks(&self.rays.get(item)))
     }
 
     #[inline(always)]
     fn meet<I: Isa>(&self, isa: I, item: usize, at: (u32, &Placed), room: &mut Room, found: &mut Vec<Met>) {
         let (leaf, brick) = at;
-        meet(isa, (self.top, &self.rays[item]), brick, room, |triangle, vertices, &Crossing { t, weights, .. }| {
+        meet(isa, (self.top, &self.rays.get(item)), brick, room, |triangle, vertices, &Crossing { t, weights, .. }| {
             found.push(Met { item, t, id: brick.id(triangle), leaf, triangle, weights, vertices });
         });
     }
@@ -76,7 +76,7 @@ impl Sweep for Listed<'_> {
 /// Rays that count what they meet.
 struct Counted<'a> {
     top: &'a Top,
-    rays: &'a [Ray],
+    rays: Rays<'a>,
     /// Whether ids are told, so that copies of a triangle in several bricks count once.
     by_id: bool,
 }
@@ -88,13 +88,13 @@ impl Sweep for Counted<'_> {
     type Asks = Slabs;
 
     fn asks(&self, item: usize) -> Option<Slabs> {
-        Some(asks(&self.rays[item]))
+        Some(asks(&self.rays.get(item)))
     }
 
     #[inline(always)]
     fn meet<I: Isa>(&self, isa: I, item: usize, at: (u32, &Placed), room: &mut Room, found: &mut Vec<Self::Found>) {
         let (mut count, brick) = (0, at.1);
-        meet(isa, (self.top, &self.rays[item]), brick, room, |triangle, _, _| {
+        meet(isa, (self.top, &self.rays.get(item)), brick, room, |triangle, _, _| {
             count += 1;
             if self.by_id {
                 found.push((item, brick.id(triangle)));
@@ -111,7 +111,8 @@ impl Queries {
     ///
     /// # Errors
     /// A ray that is none, by its number; a damaged brick; what `watch` says.
-    pub fn count_intersections(&self, rays: &[Ray], watch: &mut Watch) -> Result<Vec<u32>> {
+    pub fn count_intersections<'a>(&self, rays: impl Into<Rays<'a>>, watch: &mut Watch) -> Result<Vec<u32>> {
+        let rays = rays.into();
         self.check_rays(rays)?;
         let mut counts = vec![0u32; rays.len()];
         let mut copies = Vec::new();
@@ -133,7 +134,8 @@ impl Queries {
     ///
     /// # Errors
     /// As of [`Queries::count_intersections`].
-    pub fn list_intersections(&self, rays: &[Ray], watch: &mut Watch) -> Result<Intersections> {
+    pub fn list_intersections<'a>(&self, rays: impl Into<Rays<'a>>, watch: &mut Watch) -> Result<Intersections> {
+        let rays = rays.into();
         self.check_rays(rays)?;
         let mut all = Vec::new();
         self.sweep(rays.len(), &Listed { top: self.top(), rays }, &mut |met| all.push(met), watch)?;
@@ -166,7 +168,7 @@ impl Queries {
             Ray { origin: *from, direction: direction.to_array(), t_min, t_max }
         };
         let rays: Vec<Ray> = from.par_iter().zip(to).map(ray).collect();
-        let hides = self.meets_any(&rays, false, watch)?;
+        let hides = self.meets_any((&rays).into(), false, watch)?;
         Ok(hides.into_iter().map(|hides| !hides).collect())
     }
 }

@@ -5,7 +5,7 @@
 //! many as the cache holds. What has been at hand once is not asked for again. So of a batch each brick is read at most
 //! once, and none that no item needs.
 
-use super::packet::MANY;
+use super::packet::{ALL, MANY};
 use super::room::Room;
 use super::space::Geometry;
 use super::{Queries, Watch};
@@ -17,43 +17,46 @@ use std::cmp::Reverse;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-/// Items that a thread takes at a time.
-const TASK: usize = 256;
+/// Items that a thread takes at a time, some times [`MANY`].
+const TASK: usize = 32 * MANY;
 
-/// Items after which it is told how far work is.
+/// Items after which it is told how far work is, some times that.
 const TOLD: usize = 1 << 18;
 
 /// What looks for something.
 pub(super) trait Seek: Sync {
-    /// Who looks.
-    type Item: Sync;
+    /// Items side by side, set up.
+    type Ready;
 
-    /// What it has found.
+    /// What one has found.
     type Found: Send;
+
+    /// Sets up the items from `first` on, [`MANY`] or as many as there are. Implementations are always inlined.
+    fn ready<I: Isa>(&self, isa: I, first: usize) -> Self::Ready;
 
     /// Brings an item as far as it gets: by the bricks at hand, to the first that is away and may matter.
     /// Implementations are always inlined.
     fn go<I: Isa>(
         &self,
         isa: I,
-        item: &Self::Item,
+        item: (&Self::Ready, usize),
         found: &mut Self::Found,
         bricks: &Bricks,
         room: &mut Room,
     ) -> Option<u32>;
 
-    /// The same for items side by side, where they go faster together and nothing on their way is away. Returns which
-    /// are to go alone after all, a bit each. Implementations are always inlined.
+    /// The same for [`MANY`] items, where they go faster together and nothing on their way is away. Returns which are
+    /// to go alone after all, a bit each. Implementations are always inlined.
     #[inline(always)]
     fn go_together<I: Isa>(
         &self,
         _isa: I,
-        _items: &[Self::Item; MANY],
-        _found: [&mut Self::Found; MANY],
+        _items: &Self::Ready,
+        _found: &mut [Self::Found; MANY],
         _bricks: &Bricks,
         _room: &mut Room,
     ) -> u32 {
-        u32::MAX
+        ALL
     }
 }
 
@@ -79,12 +82,6 @@ impl<'a> Bricks<'a> {
     }
 }
 
-/// What an item has found, and whether that is all.
-struct Sought<F> {
-    found: F,
-    is_done: bool,
-}
-
 /// A round of some items.
 struct Task<'a, 'b, S: Seek> {
     seek: &'a S,
@@ -93,8 +90,11 @@ struct Task<'a, 'b, S: Seek> {
     demand: &'a [AtomicU32],
     /// How many items are done.
     done: &'a AtomicU64,
-    items: &'a [S::Item],
-    sought: &'a mut [Sought<S::Found>],
+    /// The number of the first.
+    first: usize,
+    found: &'a mut [S::Found],
+    /// Of each [`MANY`] which are not done, a bit each.
+    left: &'a mut [u8],
 }
 
 impl<S: Seek> Work for Task<'_, '_, S> {
@@ -103,29 +103,29 @@ impl<S: Seek> Work for Task<'_, '_, S> {
     #[inline(always)]
     fn run<I: Isa>(self, isa: I) {
         let (mut room, mut done) = (Room::default(), 0);
-        let (packets, _) = self.items.as_chunks();
-        let (places, _) = self.sought.as_chunks_mut();
-        for (items, sought) in packets.iter().zip(places).filter(|(_, all)| all.iter().all(|one| !one.is_done)) {
-            let found = sought.each_mut().map(
-                #[inline(always)]
-                |one| &mut one.found,
-            );
-            let alone = self.seek.go_together(isa, items, found, self.bricks, &mut room);
-            for (i, one) in sought.iter_mut().enumerate() {
-                one.is_done = alone >> i & 1 == 0;
-                done += u64::from(one.is_done);
+        for (place, (found, left)) in self.found.chunks_mut(MANY).zip(self.left).enumerate() {
+            let before = u32::from(*left);
+            if before == 0 {
+                continue;
             }
-        }
-        for (item, sought) in self.items.iter().zip(self.sought).filter(|(_, sought)| !sought.is_done) {
-            match self.seek.go(isa, item, &mut sought.found, self.bricks, &mut room) {
-                Some(brick) => {
+            let ready = self.seek.ready(isa, self.first + place * MANY);
+            let mut alone = before;
+            if before == ALL
+                && let Some(found) = found.as_mut_array()
+            {
+                alone = self.seek.go_together(isa, &ready, found, self.bricks, &mut room);
+            }
+            let mut wait = 0;
+            while alone != 0 {
+                let i = alone.trailing_zeros() as usize;
+                alone &= alone - 1;
+                if let Some(brick) = self.seek.go(isa, (&ready, i), &mut found[i], self.bricks, &mut room) {
                     self.demand[brick as usize].fetch_add(1, Ordering::Relaxed);
-                }
-                None => {
-                    sought.is_done = true;
-                    done += 1;
+                    wait |= 1 << i;
                 }
             }
+            *left = wait as u8;
+            done += u64::from((before & !wait).count_ones());
         }
         self.done.fetch_add(done, Ordering::Relaxed);
     }
@@ -139,7 +139,7 @@ impl Queries {
     pub(super) fn seek<S: Seek>(
         &self,
         seek: &S,
-        items: &[S::Item],
+        items: usize,
         nothing: impl Fn() -> S::Found + Sync,
         opacity: &[[u32; 4]],
         watch: &mut Watch,
@@ -147,8 +147,10 @@ impl Queries {
         let (resident, isa) = (self.scene.resident(), Best::for_one());
         let count = resident.exact_bricks() as u32;
         // By the threads that need it then, so that it lies near them.
-        let unsought = |_: &S::Item| Sought { found: nothing(), is_done: false };
-        let mut sought: Vec<_> = self.threads.install(|| items.par_iter().with_min_len(TASK).map(unsought).collect());
+        let mut found: Vec<S::Found> =
+            self.threads.install(|| (0..items).into_par_iter().with_min_len(TASK).map(|_| nothing()).collect());
+        let mut left: Vec<u8> =
+            (0..items).step_by(MANY).map(|first| (ALL >> MANY.saturating_sub(items - first)) as u8).collect();
         let demand: Vec<AtomicU32> = (0..count).map(|_| AtomicU32::new(0)).collect();
         let (mut is_done, done, mut told) = (vec![false; count as usize], AtomicU64::new(0), 0);
         let mut at_hand: Vec<(u32, Arc<[u8]>)> =
@@ -161,11 +163,13 @@ impl Queries {
             for ((brick, _), geometry) in at_hand.iter().zip(&geometries) {
                 bricks.0[*brick as usize] = State::AtHand(geometry);
             }
-            for (items, sought) in items.chunks(TOLD).zip(sought.chunks_mut(TOLD)) {
-                let task = |(items, sought)| {
-                    isa.run(Task { seek, bricks: &bricks, demand: &demand, done: &done, items, sought });
+            for (part, (found, left)) in found.chunks_mut(TOLD).zip(left.chunks_mut(TOLD / MANY)).enumerate() {
+                let task = |(place, (found, left))| {
+                    let first = part * TOLD + place * TASK;
+                    isa.run(Task { seek, bricks: &bricks, demand: &demand, done: &done, first, found, left });
                 };
-                self.threads.install(|| items.par_chunks(TASK).zip(sought.par_chunks_mut(TASK)).for_each(task));
+                let tasks = found.par_chunks_mut(TASK).zip(left.par_chunks_mut(TASK / MANY)).enumerate();
+                self.threads.install(|| tasks.for_each(task));
                 let now = done.load(Ordering::Relaxed);
                 watch(now - told)?;
                 told = now;
@@ -178,8 +182,7 @@ impl Queries {
             };
             let mut wanted: Vec<_> = (0..count).zip(&demand).filter_map(asked_for).collect();
             if wanted.is_empty() {
-                // In place: of many items a second list would take much memory.
-                return Ok(sought.into_iter().map(|sought| sought.found).collect());
+                return Ok(found);
             }
             wanted.sort_unstable();
             let wanted: Vec<Item> = wanted.iter().map(|&(_, brick)| Item::geometry(brick)).collect();

@@ -1,5 +1,6 @@
 //! Queries against brute force over the triangles as truth decodes them, and against closed forms.
 
+use super::aims::Aims;
 use super::packet::Packet;
 use super::*;
 use crate::kernels::layout::NONE;
@@ -68,7 +69,7 @@ fn spheres(places: &[[f64; 12]], without: usize) -> SourceScene {
     }
 }
 
-fn convert(source: SourceScene, brick_triangles: u32) -> (tempfile::TempDir, Arc<SceneFile>) {
+pub(super) fn convert(source: SourceScene, brick_triangles: u32) -> (tempfile::TempDir, Arc<SceneFile>) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.bricks");
     let settings = BuildSettings {
@@ -93,13 +94,13 @@ fn in_ball(rng: &mut Rng) -> DVec3 {
     }
 }
 
-fn all_spheres() -> SourceScene {
+pub(super) fn all_spheres() -> SourceScene {
     let places: Vec<[f64; 12]> = [IDENTITY].into_iter().chain(PLACES).collect();
     spheres(&places, 0)
 }
 
 /// Rays from about the spheres to about them; some along axes, some that end early or begin late.
-fn rays(count: usize) -> Vec<Ray> {
+pub(super) fn rays(count: usize) -> Vec<Ray> {
     let mut rng = Rng(7);
     let mut point = |spread: f64| CENTERS[rng.below(3) as usize] + spread * in_ball(&mut rng);
     let mut rays: Vec<Ray> = (0..count)
@@ -204,7 +205,11 @@ fn the_closest_hit_is_what_brute_force_finds() {
         let queries = Queries::new(file, CacheSize::Bytes(cache), threads).unwrap();
         let hits = queries.cast(&rays, &mut |_| Ok(())).unwrap();
         let any = queries.any(&rays, &mut |_| Ok(())).unwrap();
-        let together = rays.as_chunks().0.iter().filter(|rays| Packet::new(queries.top(), rays).is_some()).count();
+        let go_together = |first: &usize| {
+            let aims = Aims::new(queries.top(), &Rays::from(&rays).columns(*first));
+            Packet::new(queries.top(), &aims).is_some()
+        };
+        let together = (0..rays.len() - packet::MANY).step_by(packet::MANY).filter(go_together).count();
         assert!(together > bundles.len() / packet::MANY * 3 / 5, "{together} went together");
         let mut told = 0;
         for (number, ray) in rays.iter().enumerate() {
@@ -231,6 +236,44 @@ fn the_closest_hit_is_what_brute_force_finds() {
     assert!(all.windows(2).all(|pair| pair[0] == pair[1]), "bricks, caches and threads do not show");
     let hits = all[0].iter().filter(|hit| hit.triangle != NONE).count();
     assert!((rays.len() / 3..rays.len() * 9 / 10).contains(&hits), "{hits}");
+}
+
+#[test]
+fn short_rays_are_those_that_they_stand_for() {
+    let (_folder, file) = convert(all_spheres(), 128);
+    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
+    let mut short: Vec<[f32; 6]> = [rays(900), bundles(60)]
+        .concat()
+        .iter()
+        .enumerate()
+        .map(|(number, ray)| {
+            let [[a, b, c], way] = [ray.origin, ray.direction].map(|of| of.map(|x| x as f32));
+            // Some bundles go elsewhere.
+            let [d, e, f] = if (number / packet::MANY).is_multiple_of(3) { way.map(|x| -x) } else { way };
+            [a, b, c, d, e, f]
+        })
+        .collect();
+    // No whole number of eights.
+    short.truncate(1381);
+    let whole: Vec<Ray> = (0..short.len()).map(|number| Rays::from(short.as_slice()).get(number)).collect();
+    let given = short.as_slice();
+    let hits = queries.cast(given, &mut |_| Ok(())).unwrap();
+    assert_eq!(hits, queries.cast(&whole, &mut |_| Ok(())).unwrap());
+    assert_eq!(queries.any(given, &mut |_| Ok(())).unwrap(), queries.any(&whole, &mut |_| Ok(())).unwrap());
+    let counts = queries.count_intersections(given, &mut |_| Ok(())).unwrap();
+    assert_eq!(counts, queries.count_intersections(&whole, &mut |_| Ok(())).unwrap());
+    let list = queries.list_intersections(given, &mut |_| Ok(())).unwrap();
+    assert_eq!(list, queries.list_intersections(&whole, &mut |_| Ok(())).unwrap());
+    assert!((300..1300).contains(&hits.iter().filter(|hit| hit.triangle != NONE).count()));
+    // The control: a hair beside, hits are others.
+    let beside: Vec<Ray> = whole.iter().map(|ray| Ray { origin: ray.origin.map(|x| x + 1e-6), ..*ray }).collect();
+    assert_ne!(hits, queries.cast(&beside, &mut |_| Ok(())).unwrap());
+    for (number, bad) in [(7, [f32::NAN, 0.0, 0.0, 1.0, 0.0, 0.0]), (1300, [0.0; 6]), (1380, [f32::INFINITY; 6])] {
+        let mut short = short.clone();
+        short[number] = bad;
+        let error = queries.cast(short.as_slice(), &mut |_| Ok(())).unwrap_err();
+        assert!(format!("{error:#}").starts_with(&format!("ray {number}: ")), "{error:#}");
+    }
 }
 
 #[test]

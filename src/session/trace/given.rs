@@ -83,8 +83,14 @@ impl Scaled {
     /// A distance in lengths of the scaled direction, `t` in those of the given one.
     #[inline]
     pub fn scaled(&self, t: f64) -> f64 {
-        let [a, b] = halves(self.log2);
+        let [a, b] = self.factors();
         t * a * b
+    }
+
+    /// Two factors that do the same one after the other.
+    #[inline]
+    pub fn factors(&self) -> [f64; 2] {
+        halves(self.log2)
     }
 
     /// A distance in lengths of the given direction, `t` in those of the scaled one.
@@ -124,21 +130,16 @@ impl Surroundings {
         Some(Self { min, max, reach: (max - min).length().max(step) })
     }
 
-    /// Whether a point is in the scene's bounds, or not farther from them than their diagonal.
+    /// The corners of the room: the scene's bounds, and as much about them as their diagonal.
     #[inline(always)]
-    fn has_near(&self, p: DVec3) -> bool {
-        p.cmpge(self.min - self.reach).all() && p.cmple(self.max + self.reach).all()
+    pub fn room(&self) -> [DVec3; 2] {
+        [self.min - self.reach, self.max + self.reach]
     }
 
-    /// Where `ray` comes near the scene, and the way there in lengths of its direction, as of [`Self::approach`].
-    #[inline(always)]
-    pub fn near(&self, ray: &Ray) -> Option<(DVec3, f64)> {
-        let origin = DVec3::from_array(ray.origin);
-        if self.has_near(origin) {
-            return Some((origin, 0.0));
-        }
-        let approach = self.approach(ray)?;
-        Some((DVec3::from_array(approach.ray.origin), approach.start))
+    /// Whether a point is in the room.
+    fn has_near(&self, p: DVec3) -> bool {
+        let [min, max] = self.room();
+        p.cmpge(min).all() && p.cmple(max).all()
     }
 
     /// `ray` from where it comes near the scene; `None` if it never does. A ray that starts in the scene's bounds, or

@@ -98,10 +98,9 @@ pub fn build_mesh<'py>(
 ) -> PyResult<()> {
     let vertices = Rows::of(vertices)?;
     let (count, _) = vertices.shape();
-    vertices.check_points(py, &Named { name: "vertex", shape: vec![count] })?;
+    vertices.check(py, Rows::check_points, &Named { name: "vertex", shape: vec![count] })?;
     let indices = corners(py, faces, count)?;
-    let mut positions = Vec::with_capacity(count);
-    vertices.points(0..count, &mut positions)?;
+    let positions = vertices.points(0..count)?;
     let name = || "arrays".to_owned();
     let mesh = Mesh { name: name(), primitives: vec![Primitive { positions, indices, ..Primitive::default() }] };
     let placement = Placement { name: name(), world_from_mesh: IDENTITY, ..Placement::default() };

@@ -1,10 +1,11 @@
 //! Queries on a scene's thread: what rays meet, nearest points, what is inside.
 
 use crate::held::{Held, lock};
+use crate::rows::Rays;
 use crate::worker::Task;
 use anyhow::{Result, bail};
 use brickwalk::query::{Closest, Intersections};
-use brickwalk::session::{Hit, Ray};
+use brickwalk::session::Hit;
 
 /// Tells a task how far a query is, and ends it when nobody waits for it any more.
 fn watch(task: &Task) -> impl FnMut(u64) -> Result<()> + '_ {
@@ -18,31 +19,31 @@ fn watch(task: &Task) -> impl FnMut(u64) -> Result<()> + '_ {
 }
 
 /// What each ray meets first.
-pub fn cast(held: &mut Held, rays: &[Ray], task: &Task) -> Result<Vec<Hit>> {
-    let hits = held.ask(|queries| queries.cast(rays, &mut watch(task)))?;
+pub fn cast(held: &mut Held, rays: &Rays, task: &Task) -> Result<Vec<Hit>> {
+    let hits = held.ask(|queries| queries.cast(rays.given(), &mut watch(task)))?;
     let mut done = lock(&held.done);
-    done.rays += rays.len() as u64;
+    done.rays += hits.len() as u64;
     done.hits += hits.iter().filter(|hit| hit.triangle != u32::MAX).count() as u64;
     Ok(hits)
 }
 
 /// Whether each ray meets anything.
-pub fn any(held: &mut Held, rays: &[Ray], task: &Task) -> Result<Vec<bool>> {
-    let hits = held.ask(|queries| queries.any(rays, &mut watch(task)))?;
+pub fn any(held: &mut Held, rays: &Rays, task: &Task) -> Result<Vec<bool>> {
+    let hits = held.ask(|queries| queries.any(rays.given(), &mut watch(task)))?;
     let mut done = lock(&held.done);
-    done.occlusion_rays += rays.len() as u64;
+    done.occlusion_rays += hits.len() as u64;
     done.hits += hits.iter().filter(|&&hit| hit).count() as u64;
     Ok(hits)
 }
 
 /// How many triangles each ray meets.
-pub fn count(held: &mut Held, rays: &[Ray], task: &Task) -> Result<Vec<u32>> {
-    held.ask(|queries| queries.count_intersections(rays, &mut watch(task)))
+pub fn count(held: &mut Held, rays: &Rays, task: &Task) -> Result<Vec<u32>> {
+    held.ask(|queries| queries.count_intersections(rays.given(), &mut watch(task)))
 }
 
 /// All that rays meet.
-pub fn list(held: &mut Held, rays: &[Ray], task: &Task) -> Result<Intersections> {
-    held.ask(|queries| queries.list_intersections(rays, &mut watch(task)))
+pub fn list(held: &mut Held, rays: &Rays, task: &Task) -> Result<Intersections> {
+    held.ask(|queries| queries.list_intersections(rays.given(), &mut watch(task)))
 }
 
 /// The nearest points.

@@ -1,6 +1,7 @@
 //! Rows of arrays as rays and points, and what is wrong with them.
 
 use crate::errors::wrong;
+use brickwalk::query;
 use brickwalk::session::Ray;
 use brickwalk::session::trace::check;
 use numpy::ndarray::ArrayView2;
@@ -9,8 +10,14 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::ops::Range;
 
-/// Vertices that are checked before signals are looked for.
-const CHECKED: usize = 1 << 18;
+/// Rows that are read and then checked, while they are near.
+const CHECKED: usize = 1 << 10;
+
+/// Rows after which signals are asked for, a multiple of those.
+const BETWEEN: usize = 1 << 20;
+
+/// Refuses rows of which one is bad.
+pub type Check<'py> = fn(&Rows<'py>, Range<usize>, &Named) -> PyResult<()>;
 
 /// An array of float32 or float64 with two axes, of any strides.
 pub enum Rows<'py> {
@@ -18,6 +25,24 @@ pub enum Rows<'py> {
     Single(Bound<'py, PyArray2<f32>>),
     /// Of float64.
     Double(Bound<'py, PyArray2<f64>>),
+}
+
+/// Rays that were read.
+pub enum Rays {
+    /// With intervals.
+    Whole(Vec<Ray>),
+    /// As they were given: origin and direction in f32.
+    Short(Vec<[f32; 6]>),
+}
+
+impl Rays {
+    /// As queries take them.
+    pub fn given(&self) -> query::Rays<'_> {
+        match self {
+            Self::Whole(rays) => rays.into(),
+            Self::Short(rays) => rays.as_slice().into(),
+        }
+    }
 }
 
 /// What rows stand for: their name in messages, and the shape that they have without their last axis.
@@ -45,18 +70,17 @@ impl Named {
     }
 }
 
-/// Appends what `make` makes of `rows`, each of `N` numbers, as many as there are columns.
-fn append<const N: usize, T: Copy + Into<f64>, R>(
+/// What `make` makes of `rows`, each of `N` numbers, as many as there are columns.
+fn read<const N: usize, T: Copy + Into<f64>, R>(
     view: ArrayView2<T>,
     rows: Range<usize>,
     make: impl Fn([f64; N]) -> R,
-    to: &mut Vec<R>,
-) {
+) -> Vec<R> {
     if let Some(numbers) = view.as_slice() {
         let (rows, _) = numbers[rows.start * N..rows.end * N].as_chunks();
-        to.extend(rows.iter().map(|row| make(row.map(T::into))));
+        rows.iter().map(|row| make(row.map(T::into))).collect()
     } else {
-        to.extend(rows.map(|row| make(std::array::from_fn(|column| view[(row, column)].into()))));
+        rows.map(|row| make(std::array::from_fn(|column| view[(row, column)].into()))).collect()
     }
 }
 
@@ -100,23 +124,17 @@ impl<'py> Rows<'py> {
         (shape[0], shape[1])
     }
 
-    /// Appends what `make` makes of `rows` of them, each of `N` numbers, as many as there are columns.
-    fn append<const N: usize, R>(
-        &self,
-        rows: Range<usize>,
-        make: impl Fn([f64; N]) -> R,
-        to: &mut Vec<R>,
-    ) -> PyResult<()> {
+    /// What `make` makes of `rows` of them, each of `N` numbers, as many as there are columns.
+    fn read<const N: usize, R>(&self, rows: Range<usize>, make: impl Fn([f64; N]) -> R) -> PyResult<Vec<R>> {
         let (count, columns) = self.shape();
         if rows.end > count || columns != N {
             return Err(wrong("the array has been resized meanwhile"));
         }
         let changed = |error: numpy::BorrowError| wrong(format!("the array cannot be read: {error}"));
-        match self {
-            Self::Single(array) => append(array.try_readonly().map_err(changed)?.as_array(), rows, make, to),
-            Self::Double(array) => append(array.try_readonly().map_err(changed)?.as_array(), rows, make, to),
-        }
-        Ok(())
+        Ok(match self {
+            Self::Single(array) => read(array.try_readonly().map_err(changed)?.as_array(), rows, make),
+            Self::Double(array) => read(array.try_readonly().map_err(changed)?.as_array(), rows, make),
+        })
     }
 
     /// Whether it is plain of `rows` of `N` numbers that all are finite and that `has` holds.
@@ -128,98 +146,116 @@ impl<'py> Rows<'py> {
             }
     }
 
-    /// Whether it is plain that `rows` are rays without an interval of their own.
-    pub fn are_rays(&self, rows: Range<usize>) -> bool {
-        self.are_plain(rows, |[_, _, _, x, y, z]| (x != 0.0) | (y != 0.0) | (z != 0.0))
-    }
-
-    /// Whether it is plain that `rows` are points.
-    pub fn are_points(&self, rows: Range<usize>) -> bool {
-        self.are_plain(rows, |_: [f64; 3]| true)
-    }
-
-    /// Whether it is plain that `rows` are pairs of points.
-    pub fn are_pairs(&self, rows: Range<usize>) -> bool {
-        self.are_plain(rows, |_: [f64; 6]| true)
-    }
-
-    /// Appends rays: origin, direction, and where there are eight columns the least and the greatest distance.
+    /// Rows as rays: origin, direction, and where there are eight columns the least and the greatest distance.
     ///
     /// # Errors
     /// There are neither six nor eight columns.
-    pub fn rays(&self, rows: Range<usize>, to: &mut Vec<Ray>) -> PyResult<()> {
+    pub fn rays(&self, rows: Range<usize>) -> PyResult<Rays> {
+        if let (Self::Single(array), 6) = (self, self.shape().1)
+            && let Ok(array) = array.try_readonly()
+            && let Ok(numbers) = array.as_slice()
+            && let Some(numbers) = numbers.get(6 * rows.start..6 * rows.end)
+        {
+            return Ok(Rays::Short(numbers.as_chunks().0.to_vec()));
+        }
+        self.whole_rays(rows).map(Rays::Whole)
+    }
+
+    fn whole_rays(&self, rows: Range<usize>) -> PyResult<Vec<Ray>> {
         let ray =
             |[a, b, c, d, e, f, t_min, t_max]: [f64; 8]| Ray { origin: [a, b, c], direction: [d, e, f], t_min, t_max };
         match self.shape().1 {
-            6 => self.append(rows, |[a, b, c, d, e, f]: [f64; 6]| ray([a, b, c, d, e, f, 0.0, f64::INFINITY]), to),
-            8 => self.append(rows, ray, to),
+            6 => self.read(rows, |[a, b, c, d, e, f]: [f64; 6]| ray([a, b, c, d, e, f, 0.0, f64::INFINITY])),
+            8 => self.read(rows, ray),
             other => Err(wrong(format!("rays have 6 or 8 numbers each, not {other}"))),
         }
     }
 
-    /// Appends points.
+    /// Rows as points.
     ///
     /// # Errors
     /// There are not three columns.
-    pub fn points(&self, rows: Range<usize>, to: &mut Vec<[f64; 3]>) -> PyResult<()> {
+    pub fn points(&self, rows: Range<usize>) -> PyResult<Vec<[f64; 3]>> {
         match self.shape().1 {
-            3 => self.append(rows, |point| point, to),
+            3 => self.read(rows, |point| point),
             other => Err(wrong(format!("points have 3 numbers each, not {other}"))),
         }
     }
 
-    /// Appends pairs of points.
+    /// Rows as pairs of points.
     ///
     /// # Errors
     /// There are not six columns.
-    pub fn pairs(&self, rows: Range<usize>, to: &mut Vec<[[f64; 3]; 2]>) -> PyResult<()> {
+    pub fn pairs(&self, rows: Range<usize>) -> PyResult<Vec<[[f64; 3]; 2]>> {
         match self.shape().1 {
-            6 => self.append(rows, |[a, b, c, d, e, f]: [f64; 6]| [[a, b, c], [d, e, f]], to),
+            6 => self.read(rows, |[a, b, c, d, e, f]: [f64; 6]| [[a, b, c], [d, e, f]]),
             other => Err(wrong(format!("pairs have 6 numbers each, not {other}"))),
         }
     }
 
-    /// Refuses points that are none.
+    /// Has `check` look at all rows, some at a time, while they are near. Signals are looked for meanwhile.
     ///
     /// # Errors
-    /// Which one.
-    pub fn check_points(&self, py: Python<'_>, named: &Named) -> PyResult<()> {
-        let count = self.shape().0;
+    /// That of `check`; what a signal raises.
+    pub fn check(&self, py: Python<'_>, check: Check<'py>, named: &Named) -> PyResult<()> {
+        let (count, _) = self.shape();
         for start in (0..count).step_by(CHECKED) {
-            py.check_signals()?;
-            let mut points = Vec::new();
-            self.points(start..count.min(start + CHECKED), &mut points)?;
-            bad_point(start, &points, named).map_or(Ok(()), |text| Err(wrong(text)))?;
+            check(self, start..count.min(start + CHECKED), named)?;
+            if start % BETWEEN == 0 {
+                py.check_signals()?;
+            }
         }
         Ok(())
     }
-}
 
-/// The first of pairs of points, which begin at row `start`, that is none, and why.
-pub fn bad_pair(start: usize, pairs: &[[[f64; 3]; 2]], named: &Named) -> Option<String> {
-    bad(start, pairs, named, |pair| not_finite(pair.as_flattened()))
-}
+    /// Refuses rows of which one is no ray.
+    ///
+    /// # Errors
+    /// Which is the first, and why.
+    pub fn check_rays(&self, rows: Range<usize>, named: &Named) -> PyResult<()> {
+        let is_direction = |[.., x, y, z]: [f64; 6]| (x != 0.0) | (y != 0.0) | (z != 0.0);
+        if self.are_plain(rows.clone(), is_direction) {
+            return Ok(());
+        }
+        let start = rows.start;
+        refuse(start, &self.whole_rays(rows)?, named, |ray| match check(ray) {
+            Err(error) => Some(error.to_string()),
+            Ok(()) if ray.t_min < 0.0 => Some(format!("t_min is {}; it must be 0 or greater", ray.t_min)),
+            Ok(()) => None,
+        })
+    }
 
-/// The first of rays that is none, and why.
-pub fn bad_ray(start: usize, rays: &[Ray], named: &Named) -> Option<String> {
-    bad(start, rays, named, |ray| match check(ray) {
-        Err(error) => Some(error.to_string()),
-        Ok(()) if ray.t_min < 0.0 => Some(format!("t_min is {}; it must be 0 or greater", ray.t_min)),
-        Ok(()) => None,
-    })
-}
+    /// Refuses rows of which one is no point.
+    ///
+    /// # Errors
+    /// Which is the first, and why.
+    pub fn check_points(&self, rows: Range<usize>, named: &Named) -> PyResult<()> {
+        if self.are_plain(rows.clone(), |_: [f64; 3]| true) {
+            return Ok(());
+        }
+        let start = rows.start;
+        refuse(start, &self.points(rows)?, named, |point| not_finite(point))
+    }
 
-/// The first of points that is none, and why.
-pub fn bad_point(start: usize, points: &[[f64; 3]], named: &Named) -> Option<String> {
-    bad(start, points, named, |point| not_finite(point))
+    /// Refuses rows of which one is no pair of points.
+    ///
+    /// # Errors
+    /// Which is the first, and why.
+    pub fn check_pairs(&self, rows: Range<usize>, named: &Named) -> PyResult<()> {
+        if self.are_plain(rows.clone(), |_: [f64; 6]| true) {
+            return Ok(());
+        }
+        let start = rows.start;
+        refuse(start, &self.pairs(rows)?, named, |pair| not_finite(pair.as_flattened()))
+    }
 }
 
 fn not_finite(numbers: &[f64]) -> Option<String> {
     (!numbers.iter().all(|x| x.is_finite())).then(|| "coordinates must be finite".to_owned())
 }
 
-/// The first of `all`, which begin at row `start`, that is bad, and why.
-fn bad<T>(start: usize, all: &[T], named: &Named, is_bad: impl Fn(&T) -> Option<String>) -> Option<String> {
+/// Says which is the first of `all`, which begin at row `start`, that is bad, and why.
+fn refuse<T>(start: usize, all: &[T], named: &Named, is_bad: impl Fn(&T) -> Option<String>) -> PyResult<()> {
     let mut found = all.iter().enumerate().filter_map(|(i, one)| Some((start + i, is_bad(one)?)));
-    found.next().map(|(row, why)| format!("{}: {why}", named.row(row)))
+    found.next().map_or(Ok(()), |(row, why)| Err(wrong(format!("{}: {why}", named.row(row)))))
 }

@@ -4,13 +4,13 @@ use crate::errors::{exception, failed, wrong};
 use crate::held::{self, Done, Held, Options, Shared};
 use crate::query;
 use crate::render;
-use crate::rows::{Named, Rows, bad_pair, bad_point, bad_ray};
+use crate::rows::{Check, Named, Rays, Rows};
 use crate::worker::{Desk, Pending, Progress, Task, Worker, run_alone};
 use anyhow::Result;
 use bricks::SceneFile;
 use brickwalk::counters::Counters;
 use brickwalk::remote::{self, DiskCache, Traffic};
-use brickwalk::session::{Hit, Ray, open_unmapped};
+use brickwalk::session::{Hit, open_unmapped};
 use brickwalk::settings::{Adapter, CacheSize};
 use brickwalk::stream::PayloadSource;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -19,12 +19,6 @@ use pyo3::types::{PyDict, PyTuple};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Rows that are read and then checked, while they are near.
-const CHECKED: usize = 1 << 10;
-
-/// Rows after which signals are asked for, a multiple of those.
-const BETWEEN: usize = 1 << 20;
 
 /// Most rows of a job beside which another may wait; of more, both would take much memory.
 const BESIDE: usize = 1 << 18;
@@ -39,20 +33,15 @@ pub struct Core {
     worker: Mutex<Option<Worker<Held>>>,
 }
 
-/// Whether it is plain that nothing is wrong with rows; else they are looked at one by one.
-type Fine<'py> = fn(&Rows<'py>, Range<usize>) -> bool;
-/// Says of items that begin at a row which is the first that is none, and why.
-type Bad<R> = fn(usize, &[R], &Named) -> Option<String>;
-/// Appends some of the rows.
-type Read<'py, R> = fn(&Rows<'py>, Range<usize>, &mut Vec<R>) -> PyResult<()>;
+/// Reads rows.
+type Read<'py, R> = fn(&Rows<'py>, Range<usize>) -> PyResult<R>;
 
 /// What becomes of rows.
 struct Job<'py, 'a, R> {
     rows: Rows<'py>,
     named: Named,
     progress: Told<'py>,
-    fine: Fine<'py>,
-    bad: Bad<R>,
+    check: Check<'py>,
     read: Read<'py, R>,
     core: &'a Core,
 }
@@ -62,24 +51,14 @@ impl<'py, R: Send + 'static> Job<'py, '_, R> {
     fn run<T: Send + 'static>(
         self,
         py: Python<'py>,
-        work: impl Fn(&mut Held, &[R], &Task) -> Result<T> + Copy + Send + 'static,
+        work: impl Fn(&mut Held, &R, &Task) -> Result<T> + Copy + Send + 'static,
         mut take: impl FnMut(usize, T) -> PyResult<()>,
     ) -> PyResult<()> {
         let desk = self.core.desk()?;
         let (count, _) = self.rows.shape();
         let part = |start: usize, most: usize| start..count.min(start + most);
         // Nothing is done before all is known to be good.
-        let mut near = Vec::with_capacity(CHECKED);
-        for start in (0..count).step_by(CHECKED) {
-            if !(self.fine)(&self.rows, part(start, CHECKED)) {
-                near.clear();
-                (self.read)(&self.rows, part(start, CHECKED), &mut near)?;
-                (self.bad)(start, &near, &self.named).map_or(Ok(()), |text| Err(wrong(text)))?;
-            }
-            if start % BETWEEN == 0 {
-                py.check_signals()?;
-            }
-        }
+        self.rows.check(py, self.check, &self.named)?;
         let mut progress = Progress::new(self.progress, count as u64);
         let most = desk.run(py, &mut progress, |held, _| held.begin())?;
         let mut finish = |(part, pending): (Range<usize>, Pending<T>)| {
@@ -92,9 +71,8 @@ impl<'py, R: Send + 'static> Job<'py, '_, R> {
             if most > BESIDE {
                 last.take().map_or(Ok(()), &mut finish)?;
             }
-            let (part, mut given) = (part(start, most), Vec::new());
-            given.reserve_exact(part.len());
-            (self.read)(&self.rows, part.clone(), &mut given)?;
+            let part = part(start, most);
+            let given = (self.read)(&self.rows, part.clone())?;
             let pending = desk.begin(py, move |held, task| work(held, &given, task))?;
             last.replace((part, pending)).map_or(Ok(()), &mut finish)?;
         }
@@ -124,10 +102,9 @@ impl Core {
         rows: &Bound<'py, PyAny>,
         shape: Vec<usize>,
         progress: Told<'py>,
-    ) -> PyResult<Job<'py, '_, Ray>> {
+    ) -> PyResult<Job<'py, '_, Rays>> {
         let (rows, named) = (Rows::of(rows)?, Named { name: "ray", shape });
-        let (fine, bad, read): (Fine<'py>, Bad<_>, Read<'py, _>) = (Rows::are_rays, bad_ray, Rows::rays);
-        Ok(Job { rows, named, progress, fine, bad, read, core: self })
+        Ok(Job { rows, named, progress, check: Rows::check_rays, read: Rows::rays, core: self })
     }
 
     fn points<'py>(
@@ -135,10 +112,9 @@ impl Core {
         rows: &Bound<'py, PyAny>,
         shape: Vec<usize>,
         progress: Told<'py>,
-    ) -> PyResult<Job<'py, '_, [f64; 3]>> {
+    ) -> PyResult<Job<'py, '_, Vec<[f64; 3]>>> {
         let (rows, named) = (Rows::of(rows)?, Named { name: "point", shape });
-        let (fine, bad, read): (Fine<'py>, Bad<_>, Read<'py, _>) = (Rows::are_points, bad_point, Rows::points);
-        Ok(Job { rows, named, progress, fine, bad, read, core: self })
+        Ok(Job { rows, named, progress, check: Rows::check_points, read: Rows::points, core: self })
     }
 }
 
@@ -369,13 +345,17 @@ impl Core {
         normal: &Bound<'py, PyArray2<f32>>,
         progress: Told<'py>,
     ) -> PyResult<()> {
-        self.points(points, shape, progress)?.run(py, query::closest, |start, found| {
-            write_rows(point, start, found.iter().map(|found| found.point))?;
-            write(distance, start, found.iter().map(|found| found.distance))?;
-            write(triangle, start, found.iter().map(|found| found.triangle))?;
-            write_rows(uv, start, found.iter().map(|found| [found.u, found.v]))?;
-            write_rows(normal, start, found.iter().map(|found| found.normal))
-        })
+        self.points(points, shape, progress)?.run(
+            py,
+            |held, points, task| query::closest(held, points, task),
+            |start, found| {
+                write_rows(point, start, found.iter().map(|found| found.point))?;
+                write(distance, start, found.iter().map(|found| found.distance))?;
+                write(triangle, start, found.iter().map(|found| found.triangle))?;
+                write_rows(uv, start, found.iter().map(|found| [found.u, found.v]))?;
+                write_rows(normal, start, found.iter().map(|found| found.normal))
+            },
+        )
     }
 
     /// Fills an array with whether points are inside.
@@ -388,7 +368,8 @@ impl Core {
         open: bool,
         progress: Told<'py>,
     ) -> PyResult<()> {
-        let work = move |held: &mut Held, points: &[[f64; 3]], task: &Task| query::occupancy(held, points, open, task);
+        let work =
+            move |held: &mut Held, points: &Vec<[f64; 3]>, task: &Task| query::occupancy(held, points, open, task);
         let take = |start, found: Vec<bool>| write(inside, start, found.into_iter());
         self.points(points, shape, progress)?.run(py, work, take)
     }
@@ -403,7 +384,7 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<()> {
         let take = |start, found: Vec<f64>| write(distance, start, found.into_iter());
-        self.points(points, shape, progress)?.run(py, query::distance, take)
+        self.points(points, shape, progress)?.run(py, |held, points, task| query::distance(held, points, task), take)
     }
 
     /// Fills an array with distances, negative inside.
@@ -416,8 +397,9 @@ impl Core {
         open: bool,
         progress: Told<'py>,
     ) -> PyResult<()> {
-        let work =
-            move |held: &mut Held, points: &[[f64; 3]], task: &Task| query::signed_distance(held, points, open, task);
+        let work = move |held: &mut Held, points: &Vec<[f64; 3]>, task: &Task| {
+            query::signed_distance(held, points, open, task)
+        };
         let take = |start, found: Vec<f64>| write(distance, start, found.into_iter());
         self.points(points, shape, progress)?.run(py, work, take)
     }
@@ -432,10 +414,9 @@ impl Core {
         progress: Told<'py>,
     ) -> PyResult<()> {
         let (rows, named) = (Rows::of(pairs)?, Named { name: "pair", shape });
-        let (fine, bad, read): (Fine<'py>, Bad<_>, Read<'py, _>) = (Rows::are_pairs, bad_pair, Rows::pairs);
-        let job = Job { rows, named, progress, fine, bad, read, core: self };
+        let job = Job { rows, named, progress, check: Rows::check_pairs, read: Rows::pairs, core: self };
         let take = |start, found: Vec<bool>| write(free, start, found.into_iter());
-        job.run(py, query::visibility, take)
+        job.run(py, |held, pairs, task| query::visibility(held, pairs, task), take)
     }
 
     /// A picture: a dict of arrays, and what a person should know of it.
