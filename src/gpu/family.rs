@@ -3,12 +3,13 @@
 
 use super::device::Gpu;
 use super::groups::numbered;
-use super::kernels::{self, Kernels, Pipeline};
+use super::kernels::{FamilyPipelines, Kernels};
 use super::lamps::LampBuffers;
 use super::rays::storage;
-use crate::kernels::table::{Bindings, Family};
+use crate::kernels::table::Family;
 use crate::schedule::ExecutorError;
 use std::any::Any;
+use std::sync::Arc;
 
 /// Storage buffers of kernels of a family beside their own: 7 of the scene, 5 of the rays, 8 of shading.
 const OTHER_BUFFERS: usize = 7 + 5 + 8;
@@ -23,8 +24,7 @@ pub struct FamilyBuffers {
     pub group: wgpu::BindGroup,
     /// What its method has noted.
     pub held: Option<Box<dyn Any>>,
-    layout: wgpu::BindGroupLayout,
-    pipelines: Vec<(&'static str, Pipeline)>,
+    pipelines: Arc<FamilyPipelines>,
     buffers: Vec<wgpu::Buffer>,
 }
 
@@ -49,21 +49,15 @@ impl FamilyBuffers {
                 gpu.info.name, family.what
             )));
         }
-        let layout = kernels::family_layout(&gpu.device, family);
-        let pipelines = family.kernels.iter().map(|kernel| {
-            let own = (kernel.bindings == Bindings::Own).then_some(&layout);
-            let pipeline_layout = kernels.pipeline_layout(gpu, kernel.bindings, own);
-            (kernel.name, kernels.pipeline_of(gpu, kernel, pipeline_layout, None))
-        });
-        let pipelines = pipelines.collect();
+        let pipelines = kernels.family(gpu, family);
         let buffers: Vec<_> = family.buffers.iter().map(|buffer| storage(gpu, buffer.name, 1, buffer.stride)).collect();
-        let group = group(gpu, family, &layout, lamps, &buffers);
-        Ok(Self { family, group, held: None, layout, pipelines, buffers })
+        let group = group(gpu, family, &pipelines.layout, lamps, &buffers);
+        Ok(Self { family, group, held: None, pipelines, buffers })
     }
 
     /// The pipeline of a kernel, if it is one of these.
     pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
-        self.pipelines.iter().find(|(own, _)| *own == name).map(|(_, pipeline)| pipeline.get())
+        self.pipelines.pipeline(name)
     }
 
     /// A buffer.
@@ -100,7 +94,7 @@ impl FamilyBuffers {
 
     /// Binds the lamps and the buffers, some of which are new ones.
     pub fn rebind(&mut self, gpu: &Gpu, lamps: &LampBuffers) {
-        self.group = group(gpu, self.family, &self.layout, lamps, &self.buffers);
+        self.group = group(gpu, self.family, &self.pipelines.layout, lamps, &self.buffers);
     }
 }
 

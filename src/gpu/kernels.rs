@@ -5,7 +5,7 @@ use super::wgsl;
 use super::wgsl::Pages;
 use crate::kernels::table::{Bindings, Family, KERNELS, Kernel};
 use std::collections::HashMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 include!(concat!(env!("OUT_DIR"), "/shaders.rs"));
 
@@ -71,6 +71,20 @@ impl Pipeline {
     }
 }
 
+/// Pipelines of a family, and the layout of group 2.
+pub struct FamilyPipelines {
+    /// Group 2 of its kernels.
+    pub layout: wgpu::BindGroupLayout,
+    pipelines: Vec<(&'static str, Pipeline)>,
+}
+
+impl FamilyPipelines {
+    /// The pipeline of a kernel, if it is one of these.
+    pub fn pipeline(&self, name: &str) -> Option<&wgpu::ComputePipeline> {
+        self.pipelines.iter().find(|(own, _)| *own == name).map(|(_, pipeline)| pipeline.get())
+    }
+}
+
 /// All pipelines and the layouts of their groups.
 pub struct Kernels {
     /// Numbers of pages that they bind.
@@ -95,6 +109,8 @@ pub struct Kernels {
     pub count: bool,
     source: Source,
     pipelines: HashMap<&'static str, Pipeline>,
+    /// Those of families that an executor has asked for.
+    families: Mutex<Vec<(&'static Family, Arc<FamilyPipelines>)>>,
 }
 
 impl Kernels {
@@ -126,8 +142,22 @@ impl Kernels {
         let lamps = layout(device, "lamps", &[Read; 4]);
         let none = layout(device, "none", &[]);
         let (source, pipelines): (Source, _) = (Arc::new(source), HashMap::new());
-        let mut all =
-            Self { pages, scene, rays, cache, lamps, tiles, shading, sampling, none, count, source, pipelines };
+        let families = Mutex::default();
+        let mut all = Self {
+            pages,
+            scene,
+            rays,
+            cache,
+            lamps,
+            tiles,
+            shading,
+            sampling,
+            none,
+            count,
+            source,
+            pipelines,
+            families,
+        };
         // Scenes without textures have no kernel that looks them up, and those without binary trees none over them.
         let is_made = |kernel: &&Kernel| match kernel.bindings {
             Bindings::Sampling => pages.texels > 0,
@@ -177,6 +207,24 @@ impl Kernels {
     ) -> Pipeline {
         let source = source.unwrap_or_else(|| self.source.clone());
         Pipeline { device: gpu.device.clone(), kernel, layout, count: self.count, source, made: OnceLock::new() }
+    }
+
+    /// The pipelines of a family, which all executors with these kernels share.
+    pub fn family(&self, gpu: &Gpu, family: &'static Family) -> Arc<FamilyPipelines> {
+        let mut families = self.families.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, made)) = families.iter().find(|(own, _)| std::ptr::eq(*own, family)) {
+            return made.clone();
+        }
+        let layout = family_layout(&gpu.device, family);
+        let pipelines = family.kernels.iter().map(|kernel| {
+            let own = (kernel.bindings == Bindings::Own).then_some(&layout);
+            let pipeline_layout = self.pipeline_layout(gpu, kernel.bindings, own);
+            (kernel.name, self.pipeline_of(gpu, kernel, pipeline_layout, None))
+        });
+        let pipelines = pipelines.collect();
+        let made = Arc::new(FamilyPipelines { layout, pipelines });
+        families.push((family, made.clone()));
+        made
     }
 
     /// The pipeline of a kernel of [`KERNELS`], if there is one.
