@@ -6,10 +6,10 @@
 
 /// First and last cell, of `size`, that lie between two depths; `None`: none does.
 pub fn cells_between(from: f32, to: f32, size: u32) -> Option<(u32, u32)> {
-    let (low, high) = if from < to { (from.floor(), to.floor()) } else { (to.floor(), from.floor()) };
+    let (low, high) = if from < to { (from, to) } else { (to, from) };
     let last = size as f32 - 1.0;
     // False of a NaN, too.
-    let meets = high >= 0.0 && low <= last;
+    let meets = high >= 0.0 && low < size as f32;
     meets.then(|| (low.max(0.0) as u32, high.min(last) as u32))
 }
 

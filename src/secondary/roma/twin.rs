@@ -101,7 +101,8 @@ impl<'a> BaseMap<'a> {
 
     /// The cell that a point lies in; `None` outside.
     fn cell(&self, point: Vec3) -> Option<[u32; 3]> {
-        let c = point.map(|x| x.floor() as i32 as u32);
+        // Rounding down is a call on processors of the baseline, rounding to 0 an instruction.
+        let c = point.map(|x| if x < 0.0 { u32::MAX } else { x as u32 });
         c.iter().all(|&x| x < self.cells).then_some(c)
     }
 
@@ -344,8 +345,8 @@ impl Maps<'_> {
             return Found { t: -1.0, is_capped: false };
         }
         let last = self.own.size as i32 - 1;
-        let mut x = (along(at[0], speed[0], range[0]).floor() as i32).clamp(0, last);
-        let mut y = (along(at[1], speed[1], range[0]).floor() as i32).clamp(0, last);
+        let mut x = (along(at[0], speed[0], range[0]) as i32).clamp(0, last);
+        let mut y = (along(at[1], speed[1], range[0]) as i32).clamp(0, last);
         let mut t = range[0];
         for _ in 0..steps {
             let to_x = border(at[0], speed[0], x);
