@@ -68,19 +68,31 @@ fn found(path: &Path, part: Part, at: usize) {
     }
 }
 
-/// Flips a bit of every byte in `range`, each bit in its turn; the parts that they belong to.
+/// Flips a bit of every byte in `range`, each bit in its turn; the parts that they belong to. Every second one in a
+/// copy of the file, at the same time.
 fn flip(path: &Path, scene: &Scene, range: Range<usize>) -> Vec<Part> {
     let image = Image::read(path);
     let owners = owners(&image, scene);
-    assert_eq!(common::problems(path), "");
-    let file = File::options().write(true).open(path).unwrap();
-    for (at, (&byte, &part)) in image.bytes.iter().zip(&owners).enumerate().take(range.end).skip(range.start) {
-        write_at(&file, &[byte ^ 1 << (at % 8)], at);
-        found(path, part, at);
-        write_at(&file, &[byte], at);
-    }
-    assert_eq!(common::problems(path), "");
-    owners.into_iter().take(range.end).skip(range.start).collect()
+    let copy = path.with_extension("copy");
+    fs::copy(path, &copy).unwrap();
+    let range = range.start..range.end.min(owners.len());
+    let half = |path: &Path, first: usize| {
+        assert_eq!(common::problems(path), "");
+        let file = File::options().write(true).open(path).unwrap();
+        for at in (first..range.end).step_by(2) {
+            let byte = image.bytes[at];
+            write_at(&file, &[byte ^ 1 << (at % 8)], at);
+            found(path, owners[at], at);
+            write_at(&file, &[byte], at);
+        }
+        assert_eq!(common::problems(path), "");
+    };
+    std::thread::scope(|scope| {
+        let other = scope.spawn(|| half(&copy, range.start + 1));
+        half(path, range.start);
+        other.join().unwrap();
+    });
+    owners[range].to_vec()
 }
 
 #[test]

@@ -225,16 +225,17 @@ fn traced_rays_correct_what_maps_get_wrong() {
     let scene = scene(folder.path(), true);
     let of = |options: &str| openness(folder.path(), true, &format!("--spp 64 {options}"));
     let exact = of("");
+    let cells = "--roma-size 64";
     let mean = |pixels: &[(f64, f64)]| pixels.iter().map(|p| p.1).sum::<f64>() / pixels.len() as f64;
     let measured = |options: &str| {
         let found = of(options);
         ((mean(&found) - mean(&exact)).abs(), apart(&found, &exact))
     };
-    let (bias_of_maps, error_of_maps) = measured("--secondary roma");
+    let (bias_of_maps, error_of_maps) = measured(&format!("--secondary roma {cells}"));
     println!("maps alone: bias {bias_of_maps:.5}, error {error_of_maps:.4}");
     let mut before = 0.0;
     for one_in in [2, 4, 16] {
-        let (bias, error) = measured(&format!("--secondary sift --auto-one-in {one_in}"));
+        let (bias, error) = measured(&format!("--secondary sift --auto-one-in {one_in} {cells}"));
         println!("one in {one_in}: bias {bias:.5}, error {error:.4}");
         // Control: maps alone are too dark or too bright.
         assert!(bias < 0.2 * bias_of_maps, "one in {one_in}");
@@ -243,7 +244,7 @@ fn traced_rays_correct_what_maps_get_wrong() {
         assert!(error > before, "one in {one_in}: {error}");
         before = error;
         let all = (SIZE * SIZE * 16) as f64;
-        let traced = rays_of_ao(&scene, &format!("--secondary sift --auto-one-in {one_in}")) as f64;
+        let traced = rays_of_ao(&scene, &format!("--secondary sift --auto-one-in {one_in} {cells}")) as f64;
         assert!((traced / all * f64::from(one_in) - 1.0).abs() < 0.05, "one in {one_in}: {traced} of {all}");
     }
 }

@@ -29,7 +29,10 @@ struct Window {
     asked: Asked,
 }
 
-/// A window over a scene, with all of the panel in it.
+/// Pixels of a window: room for all of the panel, and for a narrow picture beside it.
+const SIZE: [usize; 2] = [400, 1500];
+
+/// A window over a scene.
 fn window(scene: &Path, options: &str, folder: &Path) -> Harness<'static, Window> {
     opened(scene, options, folder, Arc::new(|path, _| Ok(path.into())))
 }
@@ -47,7 +50,7 @@ fn opened(scene: &Path, options: &str, folder: &Path, converter: Converter) -> H
     };
     let state = Window { desk, asked: Asked::default() };
     Harness::builder()
-        .with_size(Vec2::new(620.0, 1500.0))
+        .with_size(SIZE.map(|x| x as f32))
         .with_max_steps(4)
         .with_step_dt(1.0 / 60.0)
         .build_ui_state(show, state)
@@ -96,7 +99,7 @@ fn click(harness: &mut Harness<Window>, at: Pos2, count: usize) {
 
 /// The window as it is drawn.
 fn drawn(harness: &Harness<Window>, painter: &mut Painter) -> Vec<u32> {
-    let (width, height) = (620, 1500);
+    let [width, height] = SIZE;
     let mut output = harness.output().clone();
     let panels = harness.ctx.tessellate(std::mem::take(&mut output.shapes), 1.0);
     let mut pixels = vec![0; width * height];

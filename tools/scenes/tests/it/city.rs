@@ -1,6 +1,6 @@
 //! The generated city as a whole: counts, determinism, the fixed centre, sound geometry, and the way through it.
 
-use crate::common::{clearance, filled, position, same_mesh, triangles};
+use crate::common::{Near, filled, position, same_mesh, triangles};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source, SourceScene};
 use brickwalk_scenes::{CameraPath, Error, Kind, Scene, Settings, generate, write_paths};
@@ -142,17 +142,17 @@ fn the_walk_keeps_clear_of_everything() {
     for seed in [0, 1, 2] {
         let path = near_path(seed, 300);
         let scene = city(900_000, seed, false);
-        let all: Vec<[DVec3; 3]> = triangles(&scene).collect();
+        let all = Near::new(triangles(&scene));
         for k in 0..300 {
             let p = position(&path, k);
-            let near = clearance(&all, p, 0.5);
+            let near = all.clearance(p, 0.5);
             assert!(near > 0.5, "seed {seed}, frame {k} at {p}: something within {near} m");
         }
         // Beside the way, where cars stand, it would not be.
         let beside = (0..300).filter(|&k| {
             let (p, t) = (position(&path, k), DVec3::from_array(path.keyframes[k].target));
             let side = (t - p).cross(DVec3::Y).normalize();
-            clearance(&all, p + side * 4.1 - DVec3::Y * 0.7, 0.5) < 0.5
+            all.clearance(p + side * 4.1 - DVec3::Y * 0.7, 0.5) < 0.5
         });
         assert!(beside.count() > 10, "the test does not see cars");
     }

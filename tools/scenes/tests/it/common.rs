@@ -3,6 +3,7 @@
 use brickwalk_convert::source::{Mesh, SourceScene};
 use brickwalk_scenes::CameraPath;
 use glam::{DAffine3, DMat3, DVec3};
+use std::collections::HashMap;
 
 /// Whether two meshes are equal to the bit.
 pub fn same_mesh(a: &Mesh, b: &Mesh) -> bool {
@@ -66,9 +67,44 @@ pub fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     edge(a, b).min(edge(b, c)).min(edge(c, a))
 }
 
+/// Triangles by the columns of space that they are near to, so that few of them are looked at from a point.
+pub struct Near {
+    all: Vec<[DVec3; 3]>,
+    columns: HashMap<[i64; 2], Vec<u32>>,
+}
+
+impl Near {
+    /// Metres to which triangles are near to a column.
+    const MOST: f64 = 1.0;
+
+    pub fn new(all: impl IntoIterator<Item = [DVec3; 3]>) -> Self {
+        let all: Vec<_> = all.into_iter().collect();
+        let mut columns: HashMap<_, Vec<u32>> = HashMap::new();
+        for (number, [a, b, c]) in (0..).zip(&all) {
+            let [low, high] = [a.min(*b).min(*c) - Self::MOST, a.max(*b).max(*c) + Self::MOST].map(Self::column);
+            for place in (low[0]..=high[0]).flat_map(|x| (low[1]..=high[1]).map(move |z| [x, z])) {
+                columns.entry(place).or_default().push(number);
+            }
+        }
+        Self { all, columns }
+    }
+
+    /// The column of 4 m by 4 m with a point.
+    fn column(p: DVec3) -> [i64; 2] {
+        [p.x, p.z].map(|x| (x / 4.0).floor() as i64)
+    }
+
+    /// [`clearance`] from all of them.
+    pub fn clearance(&self, p: DVec3, radius: f64) -> f64 {
+        assert!(radius <= Self::MOST);
+        let near = self.columns.get(&Self::column(p)).into_iter().flatten();
+        clearance(near.map(|number| &self.all[*number as usize]), p, radius)
+    }
+}
+
 /// Distance from `p` to the nearest of `all`, infinite beyond `radius`.
-pub fn clearance(all: &[[DVec3; 3]], p: DVec3, radius: f64) -> f64 {
-    all.iter()
+pub fn clearance<'a>(all: impl IntoIterator<Item = &'a [DVec3; 3]>, p: DVec3, radius: f64) -> f64 {
+    all.into_iter()
         .filter(|t| {
             let (low, high) = (t[0].min(t[1]).min(t[2]) - radius, t[0].max(t[1]).max(t[2]) + radius);
             p.cmpge(low).all() && p.cmple(high).all()

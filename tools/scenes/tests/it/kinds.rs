@@ -1,7 +1,7 @@
 //! What holds for generated scenes of every kind: counts, parts, determinism, sound geometry, and the ways through
 //! them.
 
-use crate::common::{clearance, filled, position, same_mesh, triangles};
+use crate::common::{Near, clearance, filled, position, same_mesh, triangles};
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, PART_TRIANGLES, Source};
 use brickwalk_scenes::{Kind, Scene, Settings, generate};
@@ -158,10 +158,10 @@ fn near_paths_keep_clear_and_go_on() {
             let by_the_way = |t: &[DVec3; 3]| {
                 (0..3).all(|c| t.iter().any(|p| p[c] > low[c] - 6.0) && t.iter().any(|p| p[c] < high[c] + 6.0))
             };
-            let all: Vec<[DVec3; 3]> = triangles(&large.whole()).filter(by_the_way).collect();
+            let all = Near::new(triangles(&large.whole()).filter(by_the_way));
             for k in (0..300).step_by(2) {
                 let p = position(&long, k);
-                let near = clearance(&all, p, free);
+                let near = all.clearance(p, free);
                 assert!(near > free, "{kind}, seed {seed}, frame {k} at {p}: something within {near} m");
                 if k > 0 {
                     let went = p.distance(position(&long, k - 1));
@@ -173,7 +173,7 @@ fn near_paths_keep_clear_and_go_on() {
             let beside = (0..300).step_by(4).filter(|&k| {
                 let p = position(&long, k);
                 let side = (DVec3::from_array(long.keyframes[k].target) - p).cross(DVec3::Y).normalize();
-                [-aside, aside].iter().any(|s| clearance(&all, p + side * *s - DVec3::Y * 0.7, 0.8) < 0.8)
+                [-aside, aside].iter().any(|s| all.clearance(p + side * *s - DVec3::Y * 0.7, 0.8) < 0.8)
             });
             assert!(beside.count() > 3, "{kind}: nothing beside the way");
         }

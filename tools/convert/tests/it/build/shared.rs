@@ -11,8 +11,8 @@ use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Outline, Primitive, Source, SourceError, SourceTexture};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{LazyLock, Mutex};
 
 /// Threads that do tasks side by side.
 const WORKERS: usize = 3;
@@ -88,18 +88,24 @@ fn shared_bytes(source: &dyn Source, settings: &BuildSettings, seed: u64) -> Vec
     std::fs::read(&crew.output).unwrap()
 }
 
+/// A scene that several tests share, and its file as one process makes it, by whether it has levels.
+static MADE_ALONE: LazyLock<(Computed, [Vec<u8>; 2])> = LazyLock::new(|| {
+    let source = Computed::new(300_000, 150_000);
+    let made = [false, true].map(|lod| bytes(&source, &BuildSettings { lod, ..bounded(2, 1000) }));
+    (source, made)
+});
+
 #[test]
 fn a_crew_makes_the_same_file() {
-    let source = Computed::new(300_000, 150_000);
-    for lod in [false, true] {
-        let all = bytes(&source, &BuildSettings { lod, ..bounded(2, 1000) });
+    let (source, made) = &*MADE_ALONE;
+    for (lod, all) in [false, true].into_iter().zip(made) {
         for (threads, memory, seed) in [(1, 54, 1), (2, 60, 2), (1, 1000, 3)] {
             let settings = BuildSettings { lod, ..bounded(threads, memory) };
-            assert!(shared_bytes(&source, &settings, seed) == all, "lod {lod}, {threads} threads, {memory} MiB");
+            assert!(shared_bytes(source, &settings, seed) == *all, "lod {lod}, {threads} threads, {memory} MiB");
         }
     }
     let other = bytes(&Computed::new(300_000, 149_999), &bounded(2, 1000));
-    assert!(shared_bytes(&source, &bounded(2, 60), 4) != other);
+    assert!(shared_bytes(source, &bounded(2, 60), 4) != other);
 }
 
 #[test]
@@ -145,10 +151,9 @@ impl Source for Failing<'_> {
 
 #[test]
 fn tasks_that_fail_are_done_by_others() {
-    let source = Computed::new(300_000, 150_000);
-    let all = bytes(&source, &bounded(2, 1000));
-    let failing = Failing { source: &source, random: Mutex::new(Random(6)), failures: AtomicUsize::new(0) };
-    assert!(shared_bytes(&failing, &bounded(1, 60), 6) == all);
+    let (source, [all, _]) = &*MADE_ALONE;
+    let failing = Failing { source, random: Mutex::new(Random(6)), failures: AtomicUsize::new(0) };
+    assert!(shared_bytes(&failing, &bounded(1, 60), 6) == *all);
     assert!(failing.failures.load(Ordering::Relaxed) > 0, "nothing failed");
 }
 
@@ -172,8 +177,7 @@ fn flip(path: &Path, at: i64) {
 
 #[test]
 fn what_is_damaged_is_made_again() {
-    let source = Computed::new(300_000, 150_000);
-    let [all, all_lod] = [false, true].map(|lod| bytes(&source, &BuildSettings { lod, ..bounded(1, 1000) }));
+    let (source, [all, all_lod]) = &*MADE_ALONE;
     let run = |step: &'static str, kind: &str, at: Option<i64>| {
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("scene.bricks");
@@ -191,7 +195,7 @@ fn what_is_damaged_is_made_again() {
             }
             Ok(())
         };
-        let crew = Threads { before: &before, ..Threads::new(&source, &settings, &output, 7) };
+        let crew = Threads { before: &before, ..Threads::new(source, &settings, &output, 7) };
         let result = shared(&crew, false);
         assert!(is_done.load(Ordering::Relaxed) > 0, "nothing was damaged: {step}, {kind}");
         result.map(|_| std::fs::read(&output).unwrap())
@@ -208,7 +212,7 @@ fn what_is_damaged_is_made_again() {
         ("levels", "levels-0-0", Some(40)),
     ] {
         let made = run(step, kind, at).unwrap_or_else(|error| panic!("{step}, {kind}, {at:?}: {error}"));
-        assert!(made == *if step == "levels" { &all_lod } else { &all }, "{step}, {kind}, {at:?}");
+        assert!(made == *if step == "levels" { all_lod } else { all }, "{step}, {kind}, {at:?}");
     }
     // What it was made from is gone: then it is an error and not another scene.
     let result = run("cut", "order", Some(0));
@@ -217,8 +221,7 @@ fn what_is_damaged_is_made_again() {
 
 #[test]
 fn a_conversion_whose_leader_ends_is_continued() {
-    let source = Computed::new(300_000, 150_000);
-    let [all, all_lod] = [false, true].map(|lod| bytes(&source, &BuildSettings { lod, ..bounded(1, 1000) }));
+    let (source, [all, all_lod]) = &*MADE_ALONE;
     for step in ["objects", "gather", "cut", "distribute", "encode", "levels"] {
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("scene.bricks");
@@ -227,7 +230,7 @@ fn a_conversion_whose_leader_ends_is_continued() {
             true => Err(CrewError::Failed("the cluster is gone".to_owned())),
             false => Ok(()),
         };
-        let crew = Threads { before: &before, ..Threads::new(&source, &settings, &output, 8) };
+        let crew = Threads { before: &before, ..Threads::new(source, &settings, &output, 8) };
         let error = shared(&crew, false).unwrap_err();
         assert!(matches!(error, BuildError::Crew { .. }), "{error}");
         assert!(!output.exists());
@@ -237,7 +240,7 @@ fn a_conversion_whose_leader_ends_is_continued() {
             .collect();
         // Alone it cannot be continued: its pieces are others.
         let alone =
-            build_source(&source, &BuildSettings { resume: true, ..settings.clone() }, &output, &Progress::hidden());
+            build_source(source, &BuildSettings { resume: true, ..settings.clone() }, &output, &Progress::hidden());
         assert!(matches!(alone, Err(BuildError::OtherConversion { .. })), "{alone:?}");
         let steps = AtomicUsize::new(0);
         let check = |now: &TaskStep, _: &[u64]| {
@@ -252,9 +255,9 @@ fn a_conversion_whose_leader_ends_is_continued() {
             }
             Ok(())
         };
-        let crew = Threads { before: &check, ..Threads::new(&source, &settings, &output, 9) };
+        let crew = Threads { before: &check, ..Threads::new(source, &settings, &output, 9) };
         shared(&crew, true).unwrap();
-        let all = if step == "levels" { &all_lod } else { &all };
+        let all = if step == "levels" { all_lod } else { all };
         assert!(std::fs::read(&output).unwrap() == *all, "{step}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
