@@ -24,7 +24,7 @@ use bricks::NONE;
 use parse::{Parsed, Run};
 use std::collections::{BTreeMap, HashMap};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
 /// Texture coordinates are taken as they are.
@@ -144,7 +144,8 @@ fn looks(reach: &Reach, parsed: &Parsed, spool: &Spool, warnings: &mut Warnings,
     for library in &parsed.libraries {
         match read_library(reach, library, spool, hash) {
             Ok(definitions) => {
-                for definition in definitions {
+                for mut definition in definitions {
+                    definition.maps().for_each(|(file, _)| locate(reach, library, file));
                     known.entry(definition.name.clone()).or_insert(definition);
                 }
             }
@@ -206,9 +207,25 @@ fn read_library(reach: &Reach, library: &str, spool: &Spool, hash: &mut Xxh3) ->
     mtl::read(&mut Lines::new(bytes.stream(spool).map_err(|e| e.to_string())?)).map_err(|e| e.to_string())
 }
 
-/// The bytes of a file that the OBJ file names; the path may be written as on Windows.
+/// Makes `file`, which a material library names, a path from the OBJ file's folder if it lies beside the library. Some
+/// programs mean that folder, others the OBJ file's: then it stays as it is.
+fn locate(reach: &Reach, library: &str, file: &mut String) {
+    let library = library.replace('\\', "/");
+    let Some((folder, _)) = library.rsplit_once('/') else { return };
+    let beside = format!("{folder}/{file}");
+    if below(reach, &beside).is_ok_and(|path| reach.path(&path).is_file()) {
+        *file = beside;
+    }
+}
+
+/// Where a file that the OBJ file names is, below the root; the path may be written as on Windows.
+fn below(reach: &Reach, file: &str) -> Result<PathBuf, &'static str> {
+    uri::below(reach.own(file.replace('\\', "/")))
+}
+
+/// Its bytes.
 fn beside(reach: &Reach, file: &str, spool: &Spool) -> Result<Bytes, String> {
-    reach.file(&uri::below(reach.own(file.replace('\\', "/")))?, spool)
+    reach.file(&below(reach, file)?, spool)
 }
 
 impl Parts for Obj {

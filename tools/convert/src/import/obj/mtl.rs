@@ -65,6 +65,12 @@ impl Definition {
         }
     }
 
+    /// Its pictures.
+    pub fn maps(&mut self) -> impl Iterator<Item = &mut Map> {
+        let Self { color, emission, normals, roughness, metallic, .. } = self;
+        [color, emission, normals, roughness, metallic].into_iter().flatten()
+    }
+
     fn warn(&mut self, what: &'static str) {
         if !self.warnings.contains(&what) {
             self.warnings.push(what);

@@ -543,3 +543,38 @@ fn obj_maps_become_textures() {
     assert_eq!(primitives[0].tangents.as_deref(), Some(&[[1.0, 0.0, 0.0, 1.0]; 3][..]));
     assert!(primitives[1].tangents.is_none());
 }
+
+/// Maps lie beside the material library, or beside the OBJ file; where both have one, the library's is meant.
+#[test]
+fn obj_maps_lie_beside_their_library_or_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let below = |name: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(&path).unwrap();
+        path
+    };
+    let (looks, pictures) = (below("looks"), below("looks/pictures"));
+    write(
+        &looks,
+        "m.mtl",
+        b"newmtl a\nmap_Kd pictures\\c.png\nmap_Ke e.png\nnewmtl b\nmap_Kd both.png\nnorm none.png\n",
+    );
+    write(&pictures, "c.png", &png(1, 1, &[1; 4]));
+    write(folder.path(), "e.png", &png(1, 1, &[2; 4]));
+    write(&looks, "both.png", &png(1, 1, &[3; 4]));
+    write(folder.path(), "both.png", &png(1, 1, &[4; 4]));
+    let text =
+        "mtllib looks\\m.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\nusemtl b\nf 1/1 2/1 3/1\n";
+    let model = write(folder.path(), "a.obj", text.as_bytes());
+    let first = |scene: &SourceScene| {
+        let of = |texture: u32| scene.textures.get(texture as usize).map(|texture| texture.rgba[0]);
+        let [a, b] = [0, 1].map(|material| scene.materials[material].textures());
+        [of(a[0]), of(a[4]), of(b[0])]
+    };
+    let scene = import_one(&model).unwrap();
+    assert_eq!(first(&scene), [Some(1), Some(2), Some(3)]);
+    assert!(scene.warnings.iter().all(|warning| warning.contains("none.png")), "{:?}", scene.warnings);
+    // The control: without the library's own, the model's is taken.
+    std::fs::remove_file(looks.join("both.png")).unwrap();
+    assert_eq!(first(&import_one(&model).unwrap()), [Some(1), Some(2), Some(4)]);
+}
