@@ -12,14 +12,13 @@ use super::given::Columns;
 use super::room::Inner;
 use super::space::{Geometry, Placed, Slabs};
 use super::top::Top;
-use super::walk::{Asks, Open, walk};
+use super::walk::{Asks, Branch, Open, walk};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
 use crate::math::crossing::{Crossing, Line, crossing_near};
 use crate::output::npy::Ray;
 use crate::scene::placement::affine;
 use crate::session::trace::Scaled;
-use bricks::Node;
 use bricks::planted::{self, Defect};
 use glam::{DMat3, DVec3};
 
@@ -45,18 +44,17 @@ impl Local {
     }
 }
 
-impl Asks for Local {
+impl<B: Branch> Asks<B> for Local {
     #[inline(always)]
-    fn ask<I: Isa>(&self, isa: I, node: &Node, limit: f32) -> (u32, [f32; 8]) {
+    fn ask<I: Isa>(&self, isa: I, node: &B, limit: f32) -> (u32, [f32; 8]) {
         let Locals { ahead, behind, t_min, .. } = &self.of;
         let (mut near, mut end) = (isa.eight(t_min[0]), isa.eight(limit));
         for k in 0..3 {
-            let (step, inverse) = (f32::from_bits(u32::from(node.exponent[k]) << 23), self.inverse[k]);
+            let ((step, origin), inverse, is_negative) = (node.grid(k), self.inverse[k], self.is_negative[k]);
             let scale = isa.eight(step * inverse);
-            let (first, last) =
-                if self.is_negative[k] { (&node.hi[k], &node.lo[k]) } else { (&node.lo[k], &node.hi[k]) };
-            near = near.most(isa.numbers(first) * scale + isa.eight((node.origin[k] - ahead[k][0]) * inverse));
-            end = end.least(isa.numbers(last) * scale + isa.eight((node.origin[k] - behind[k][0]) * inverse));
+            let (first, last) = (node.bounds(isa, k, is_negative), node.bounds(isa, k, !is_negative));
+            near = near.most(first * scale + isa.eight((origin - ahead[k][0]) * inverse));
+            end = end.least(last * scale + isa.eight((origin - behind[k][0]) * inverse));
         }
         let mut nears = [0.0; 8];
         near.store(&mut nears);

@@ -20,7 +20,7 @@ pub(super) const LEAST_STEP: f64 = 1.0 / (1u64 << 20) as f64;
 pub(super) const MOVED: f64 = 1.0 / (1u64 << 51) as f64;
 
 /// Units of distances by which boxes are grown.
-const GROWN: f32 = 72.0 * UNIT;
+pub(super) const GROWN: f32 = 72.0 * UNIT;
 
 /// Rays on their way. Distances along them are counted from `near`, in lengths of their scaled directions.
 pub(super) struct Aims<const N: usize> {

@@ -248,7 +248,12 @@ impl Queries {
     /// # Errors
     /// A ray that is none, by its number; a damaged brick; what `watch` says.
     pub fn cast<'a>(&self, rays: impl Into<Rays<'a>>, watch: &mut Watch) -> Result<Vec<Hit>> {
-        let found = self.find(rays.into(), (false, true), watch)?;
+        let rays = rays.into();
+        self.check_rays(rays)?;
+        if let Some(flat) = self.flat(rays.len(), watch)? {
+            return self.cast_flat(flat, rays, watch);
+        }
+        let found = self.find(rays, (false, true), watch)?;
         let of = |found: &Found| (found.leaf, found.triangle);
         let rotations = self.rotations(&found, of)?;
         let hit = |(found, rotation): (&Found, u8)| {
@@ -268,12 +273,15 @@ impl Queries {
 
     /// Whether each ray meets anything; with `passes` anything that it does not pass through.
     pub(super) fn meets_any(&self, rays: Rays, passes: bool, watch: &mut Watch) -> Result<Vec<bool>> {
+        self.check_rays(rays)?;
+        if let Some(flat) = self.flat(rays.len(), watch)? {
+            return self.cast_flat(flat, rays, watch);
+        }
         let found = self.find(rays, (true, passes), watch)?;
         Ok(self.threads.install(|| found.par_iter().map(|found| found.id != NONE).collect()))
     }
 
     fn find(&self, rays: Rays, (any, passes): (bool, bool), watch: &mut Watch) -> Result<Vec<Found>> {
-        self.check_rays(rays)?;
         let has_opacity = passes && opacity::is_needed(self.scene.resident());
         let opacity = if has_opacity { opacity::table(&self.scene)? } else { Vec::new() };
         let casting = Casting { queries: self, rays, any, passes };

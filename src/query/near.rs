@@ -1,10 +1,9 @@
 //! How points find what may be nearest: squared distances of boxes in f32, in frames in which these are small.
 
-use super::walk::Asks;
+use super::walk::{Asks, Branch};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::Wide;
 use crate::kernels::trace::node::UNIT;
-use bricks::Node;
 use glam::DVec3;
 
 /// Of coordinates that took part: many times the f64 roundings of what is computed from them.
@@ -50,16 +49,16 @@ impl Near {
     }
 }
 
-impl Asks for Near {
+impl<B: Branch> Asks<B> for Near {
     #[inline(always)]
-    fn ask<I: Isa>(&self, isa: I, node: &Node, limit: f32) -> (u32, [f32; 8]) {
+    fn ask<I: Isa>(&self, isa: I, node: &B, limit: f32) -> (u32, [f32; 8]) {
         let (pad, zero) = (self.pad, isa.eight(0.0));
         let mut sum = zero;
         for k in 0..3 {
-            let step = isa.eight(f32::from_bits(u32::from(node.exponent[k]) << 23));
-            let way = node.origin[k] - self.at[k];
-            let below = isa.numbers(&node.lo[k]) * step + isa.eight(way - pad);
-            let above = isa.eight(-way - pad) - isa.numbers(&node.hi[k]) * step;
+            let (step, origin) = node.grid(k);
+            let (step, way) = (isa.eight(step), origin - self.at[k]);
+            let below = node.bounds(isa, k, false) * step + isa.eight(way - pad);
+            let above = isa.eight(-way - pad) - node.bounds(isa, k, true) * step;
             let gap = below.most(above).most(zero);
             sum = sum + gap * gap;
         }
@@ -76,6 +75,7 @@ mod tests {
     use super::*;
     use crate::kernels::simd::isa::for_each_isa;
     use crate::math::random::Rng;
+    use bricks::Node;
 
     /// A node whose children's boxes are as the numbers draw them, in steps of 2^-6 to 2^1.
     fn node(rng: &mut Rng) -> Node {

@@ -5,13 +5,13 @@
 //! walk waits for most, memory and branches that turn out otherwise, is there once for eight.
 
 use super::aims::{Aims, Locals, Told};
+use super::flat::Flat;
 use super::room::Joint;
 use super::space::{Geometry, Placed};
 use super::top::Top;
-use super::walk::{Open, child, elements};
+use super::walk::{Branch, Open, elements};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
-use bricks::Node;
 use glam::DVec3;
 use std::ops::Range;
 
@@ -85,7 +85,7 @@ impl<'a> Packet<'a> {
         let limits = self.limits(&locals.told, &t);
         self.walk(
             isa,
-            (&top.nodes, &locals),
+            (top.nodes.as_slice(), &locals),
             ALL,
             limits,
             open,
@@ -103,8 +103,8 @@ impl<'a> Packet<'a> {
         brick: &Placed,
         (from, who): (f64, u32),
         open: &mut Vec<Joint>,
-        mut t: [f64; MANY],
-        mut visit: impl FnMut(u32, [DVec3; 3], usize) -> f64,
+        t: [f64; MANY],
+        visit: impl FnMut(u32, [DVec3; 3], usize) -> f64,
     ) -> bool {
         let is_known = (0..MANY).fold(
             true,
@@ -116,17 +116,49 @@ impl<'a> Packet<'a> {
         }
         let &Geometry { origin, per_unit, step, extent, .. } = brick.geometry;
         let locals = self.aims.locals((origin, extent), per_unit, (from, step));
+        let nodes = brick.geometry.view.nodes;
+        let tree = (nodes, &locals, |triangle| brick.vertices(triangle));
+        self.through(isa, tree, who, open, t, visit);
+        true
+    }
+
+    /// The same for all rays, of the whole scene.
+    #[inline(always)]
+    pub(super) fn triangles_of_all<I: Isa>(
+        &self,
+        isa: I,
+        (top, flat): (&Top, &Flat),
+        open: &mut Vec<Joint>,
+        t: [f64; MANY],
+        visit: impl FnMut(u32, [DVec3; 3], usize) -> f64,
+    ) {
+        let locals = flat.locals(top, self.aims);
+        let tree = (flat.nodes.as_slice(), &locals, |triangle| flat.vertices(triangle));
+        self.through(isa, tree, ALL, open, t, visit);
+    }
+
+    /// Calls `visit` for triangles of a tree, whose `vertices` are told, as of [`Packet::triangles`].
+    #[inline(always)]
+    fn through<I: Isa>(
+        &self,
+        isa: I,
+        (nodes, locals, vertices): (&[impl Branch], &Locals<MANY>, impl Fn(u32) -> [DVec3; 3]),
+        who: u32,
+        open: &mut Vec<Joint>,
+        mut t: [f64; MANY],
+        mut visit: impl FnMut(u32, [DVec3; 3], usize) -> f64,
+    ) {
         let mut limits = self.limits(&locals.told, &t);
         self.walk(
             isa,
-            (brick.geometry.view.nodes, &locals),
+            (nodes, locals),
             who,
             limits,
             open,
             #[inline(always)]
             |triangles, _, who| {
                 for triangle in triangles {
-                    let vertices = brick.vertices(triangle);
+                    let vertices = vertices(triangle);
                     let mut left = who & !self.aims.lines.surely_miss(vertices);
                     while left != 0 {
                         let ray = left.trailing_zeros() as usize;
@@ -141,7 +173,6 @@ impl<'a> Packet<'a> {
                 limits
             },
         );
-        true
     }
 
     /// As [`super::walk::walk`], for the rays of `who`: `visit` is told which of them may meet a leaf, and returns the
@@ -150,7 +181,7 @@ impl<'a> Packet<'a> {
     fn walk<I: Isa>(
         &self,
         isa: I,
-        (nodes, locals): (&[Node], &Locals<MANY>),
+        (nodes, locals): (&[impl Branch], &Locals<MANY>),
         who: u32,
         mut limits: [f32; MANY],
         open: &mut Vec<Joint>,
@@ -176,7 +207,7 @@ impl<'a> Packet<'a> {
             while left != 0 {
                 let slot = left.trailing_zeros();
                 left &= left - 1;
-                let Some(number) = child(node, slot) else { continue };
+                let Some(number) = node.child(slot) else { continue };
                 let own = (Open::new(least(&near[slot as usize]), number), by[slot as usize]);
                 nearest = Some(nearest.map_or(
                     own,
@@ -197,21 +228,19 @@ impl<'a> Packet<'a> {
         &self,
         isa: I,
         locals: &Locals<MANY>,
-        node: &Node,
+        node: &impl Branch,
         (limits, who): (&[f32; MANY], u32),
     ) -> (u32, [[f32; MANY]; 8], [u32; 8]) {
         let (mut nears, mut ends) = ([isa.load_eight(&locals.t_min); 8], [isa.load_eight(limits); 8]);
         for k in 0..3 {
             let inverse = isa.load_eight(&self.aims.inverse[k]);
-            let (scale, origin) =
-                (isa.eight(f32::from_bits(u32::from(node.exponent[k]) << 23)) * inverse, isa.eight(node.origin[k]));
+            let (step, origin) = node.grid(k);
+            let (scale, origin) = (isa.eight(step) * inverse, isa.eight(origin));
             let ahead = (origin - isa.load_eight(&locals.ahead[k])) * inverse;
             let behind = (origin - isa.load_eight(&locals.behind[k])) * inverse;
-            let (first, last) =
-                if self.is_negative[k] { (&node.hi[k], &node.lo[k]) } else { (&node.lo[k], &node.hi[k]) };
             let (mut begins, mut stops) = ([0.0; 8], [0.0; 8]);
-            isa.numbers(first).store(&mut begins);
-            isa.numbers(last).store(&mut stops);
+            node.bounds(isa, k, self.is_negative[k]).store(&mut begins);
+            node.bounds(isa, k, !self.is_negative[k]).store(&mut stops);
             for slot in 0..8 {
                 nears[slot] = nears[slot].most(isa.eight(begins[slot]) * scale + ahead);
                 ends[slot] = ends[slot].least(isa.eight(stops[slot]) * scale + behind);

@@ -39,6 +39,12 @@ impl<const N: usize> Boxes<N> {
         Self { min, max, pad }
     }
 
+    /// Their lower and upper bounds, grown.
+    pub(super) fn grown(&self) -> [[[f64; N]; 3]; 2] {
+        let axes = |of: &[[f64; N]; 3], pad: f64| of.map(|axis| axis.map(|x| x + pad));
+        [axes(&self.min, -self.pad), axes(&self.max, self.pad)]
+    }
+
     /// No more than the squared distance of `point` from anything in each box.
     #[inline(always)]
     pub(super) fn distances_squared(&self, point: DVec3) -> [f64; N] {
@@ -152,6 +158,17 @@ impl<'a> Geometry<'a> {
     }
 }
 
+/// A point of an object in the world: where a matrix, if there is one, has it.
+#[inline(always)]
+pub(super) fn world(matrix: Option<&[f64; 12]>, p: DVec3) -> DVec3 {
+    let Some(m) = matrix else { return p };
+    DVec3::new(
+        m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3],
+        m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
+        m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11],
+    )
+}
+
 /// A brick where an instance has it.
 pub(super) struct Placed<'a> {
     pub(super) geometry: &'a Geometry<'a>,
@@ -175,7 +192,7 @@ impl<'a> Placed<'a> {
 
     /// By how much its boxes are grown.
     #[inline(always)]
-    fn pad(&self) -> f64 {
+    pub(super) fn pad(&self) -> f64 {
         let far = self.geometry.far;
         let Some(m) = self.matrix else { return MARGIN * far.max_element() };
         // What the rows of a matrix add up is rounded by its terms, not by their sum.
@@ -198,22 +215,13 @@ impl<'a> Placed<'a> {
         let &Geometry { origin, unit, ref view, .. } = self.geometry;
         let [a, b, c] = view.corners(triangle);
         let [a, b, c] = [DVec3::from_array(a), DVec3::from_array(b), DVec3::from_array(c)];
-        [self.world(origin + a * unit), self.world(origin + b * unit), self.world(origin + c * unit)]
-    }
-
-    #[inline(always)]
-    fn world(&self, p: DVec3) -> DVec3 {
-        let Some(m) = self.matrix else { return p };
-        DVec3::new(
-            m[0] * p.x + m[1] * p.y + m[2] * p.z + m[3],
-            m[4] * p.x + m[5] * p.y + m[6] * p.z + m[7],
-            m[8] * p.x + m[9] * p.y + m[10] * p.z + m[11],
-        )
+        let world = |p: DVec3| world(self.matrix, origin + p * unit);
+        [world(a), world(b), world(c)]
     }
 
     /// The world's boxes of what the children of a node hold.
     #[inline(always)]
-    fn boxes(&self, node: &Node, pad: f64) -> Boxes<8> {
+    pub(super) fn boxes(&self, node: &Node, pad: f64) -> Boxes<8> {
         let &Geometry { origin: from, unit, .. } = self.geometry;
         let scale = |k: usize| f64::from_bits((u64::from(node.exponent[k]) + 1023 - 127) << 52) * unit;
         let grid = |bounds: &[[u8; 8]; 3]| -> [[f64; 8]; 3] {

@@ -19,6 +19,8 @@ pub(super) struct Store {
     batch_bytes: u64,
     /// Bytes that the cache keeps.
     kept_bytes: u64,
+    /// Bytes of what was made of payloads.
+    beside: AtomicU64,
     most: AtomicU64,
 }
 
@@ -28,7 +30,7 @@ impl Store {
         let batch_bytes = (bytes / 4).max(LEAST_BATCH);
         let kept_bytes = bytes.saturating_sub(batch_bytes);
         let workers = Workers::new(scene.clone(), HostCache::new(kept_bytes), threads)?;
-        Ok(Self { scene, workers, batch_bytes, kept_bytes, most: AtomicU64::new(0) })
+        Ok(Self { scene, workers, batch_bytes, kept_bytes, beside: AtomicU64::new(0), most: AtomicU64::new(0) })
     }
 
     fn bytes(&self, item: Item) -> u64 {
@@ -100,11 +102,23 @@ impl Store {
             let loaded = self.workers.load(requests)?;
             let held = loaded.into_iter().map(|(item, held)| held.0.ok_or_else(|| anyhow!("{item}: no payload")));
             let held = held.collect::<Result<Vec<_>>>()?;
-            self.most.fetch_max(sum + self.workers.host_cache().stats().used_bytes, Ordering::Relaxed);
+            self.note_held(sum);
             visit(first, &held)?;
             first = end;
         }
         Ok(())
+    }
+
+    /// Notes that `bytes` of payloads are in use, beside what is kept.
+    fn note_held(&self, bytes: u64) {
+        let kept = self.workers.host_cache().stats().used_bytes + self.beside.load(Ordering::Relaxed);
+        self.most.fetch_max(bytes + kept, Ordering::Relaxed);
+    }
+
+    /// Notes that something of so many bytes was made of payloads, and stays.
+    pub(super) fn note_beside(&self, bytes: u64) {
+        self.beside.fetch_add(bytes, Ordering::Relaxed);
+        self.note_held(0);
     }
 
     /// Payloads and bytes read from the file so far, and most bytes that were held.

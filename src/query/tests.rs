@@ -15,6 +15,7 @@ use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{Mesh, Placement, Primitive, SourceScene};
 use glam::DVec3;
 use std::f64::consts::PI;
+use std::sync::atomic::Ordering;
 
 const IDENTITY: [f64; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 /// Turned about y and scaled; mirrored; far away and sheared.
@@ -134,6 +135,17 @@ fn bundles(count: usize) -> Vec<Ray> {
     bundles
 }
 
+/// Queries that have seen so many rays that they make the scene one tree, if they have room for it.
+fn after_many(file: Arc<SceneFile>, cache: CacheSize, threads: usize) -> Queries {
+    let queries = Queries::new(file, cache, threads).unwrap();
+    queries.rays.store(1 << 40, Ordering::Relaxed);
+    queries
+}
+
+fn has_tree(queries: &Queries) -> bool {
+    queries.flat.get().is_some_and(Option::is_some)
+}
+
 fn brute(truth: &Truth, ray: &Ray) -> Vec<(f64, u32)> {
     let line = TruthRay::new(ray.origin, ray.direction, 0.0, 0.0).line();
     let met = |id| Some((crossing(&line, truth.vertices(id)?)?.t, id));
@@ -196,15 +208,18 @@ fn the_closest_hit_is_what_brute_force_finds() {
     rays.extend(afar);
     let mut expected: Vec<Option<(f64, u32)>> = Vec::new();
     let mut all = Vec::new();
-    for (brick_triangles, cache, threads) in [(1 << 14, 64 << 20, 1), (128, 64 << 20, 2), (128, 0, 2), (64, 0, 1)] {
+    let all_bricks = 1 << 20;
+    let cases = [(1 << 14, 64 << 20, 1), (128, 64 << 20, 2), (128, all_bricks, 2), (128, 0, 2), (64, 0, 1)];
+    for (brick_triangles, cache, threads) in cases {
         let (_folder, file) = convert(all_spheres(), brick_triangles);
         let truth = Truth::load(&file).unwrap();
         if expected.is_empty() {
             expected = rays.iter().map(|ray| first(&truth, ray)).collect();
         }
-        let queries = Queries::new(file, CacheSize::Bytes(cache), threads).unwrap();
+        let queries = after_many(file, CacheSize::Bytes(cache), threads);
         let hits = queries.cast(&rays, &mut |_| Ok(())).unwrap();
         let any = queries.any(&rays, &mut |_| Ok(())).unwrap();
+        assert_eq!(has_tree(&queries), cache > all_bricks);
         let go_together = |first: &usize| {
             let aims = Aims::new(queries.top(), &Rays::from(&rays).columns(*first));
             Packet::new(queries.top(), &aims).is_some()
@@ -241,7 +256,7 @@ fn the_closest_hit_is_what_brute_force_finds() {
 #[test]
 fn short_rays_are_those_that_they_stand_for() {
     let (_folder, file) = convert(all_spheres(), 128);
-    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
+    let queries = after_many(file, CacheSize::Auto, 2);
     let mut short: Vec<[f32; 6]> = [rays(900), bundles(60)]
         .concat()
         .iter()
@@ -287,7 +302,7 @@ fn instances_that_f32_does_not_know_are_asked_in_f64() {
     ];
     let (_folder, file) = convert(spheres(&places, 0), 128);
     let truth = Truth::load(&file).unwrap();
-    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
+    let queries = Queries::new(file.clone(), CacheSize::Bytes(0), 2).unwrap();
     let mut rng = Rng(11);
     let centers = [DVec3::ZERO, DVec3::new(900.0, 1e5, -3e4), CENTERS[1]];
     let rays: Vec<Ray> = (0..900)
@@ -307,6 +322,45 @@ fn instances_that_f32_does_not_know_are_asked_in_f64() {
     }
     let met = |which: usize| hits.iter().skip(which).step_by(3).filter(|hit| hit.triangle != NONE).count();
     assert!([0, 1, 2].iter().all(|&which| met(which) > 100), "{:?}", [0, 1, 2].map(met));
+    // In one frame f32 does not tell the boxes of the small one apart, so that the scene stays in bricks.
+    let queries = after_many(file, CacheSize::Bytes(64 << 20), 2);
+    assert_eq!(queries.cast(&rays, &mut |_| Ok(())).unwrap(), hits);
+    assert!(queries.flat.get().is_some_and(Option::is_none));
+}
+
+#[test]
+fn the_scene_becomes_one_tree_where_it_pays_and_there_is_room() {
+    let (_folder, file) = convert(all_spheres(), 128);
+    let (rays, triangles) = (rays(400), file.resident().instances.len() * 48 * 46);
+    let tree = flat::bytes(file.resident()).unwrap();
+    assert!(tree as usize > triangles * 48, "{tree}");
+    let cast = |queries: &Queries| queries.cast(&rays, &mut |_| Ok(())).unwrap();
+
+    // Few rays do not pay for it.
+    let queries = Queries::new(file.clone(), CacheSize::Auto, 2).unwrap();
+    let hits = cast(&queries);
+    assert!(!has_tree(&queries));
+    queries.rays.store(triangles as u64 / 2, Ordering::Relaxed);
+    let held = queries.stats().most_bytes;
+    // Who stops it leaves all as it was.
+    assert!(queries.cast(&rays, &mut |_| anyhow::bail!("enough")).is_err());
+    assert!(!has_tree(&queries));
+    assert_eq!(cast(&queries), hits);
+    assert!(has_tree(&queries));
+    assert!(queries.stats().most_bytes >= held.max(tree), "what it takes is told");
+
+    let bricks = all_bytes(&file);
+    let bricks = bricks + bricks / 2 + BESIDE;
+    for (cache, has_one) in [
+        (CacheSize::Percent(100.0), true),
+        (CacheSize::Percent(99.0), false),
+        (CacheSize::Bytes(bricks + tree), true),
+        (CacheSize::Bytes(bricks + tree - 1), false),
+    ] {
+        let queries = after_many(file.clone(), cache, 2);
+        assert_eq!(cast(&queries), hits);
+        assert_eq!(has_tree(&queries), has_one, "{cache:?}");
+    }
 }
 
 #[test]
@@ -329,8 +383,9 @@ fn rays_pass_through_what_is_cut_out() {
     let rays = rays(400);
     let (_folder, file) = convert(source.clone(), 128);
     let truth = Truth::load(&file).unwrap();
-    let queries = Queries::new(file, CacheSize::Bytes(0), 2).unwrap();
+    let queries = after_many(file, CacheSize::Bytes(64 << 20), 2);
     let hits = queries.cast(&rays, &mut |_| Ok(())).unwrap();
+    assert!(!has_tree(&queries), "what rays pass through is in bricks alone");
     for (number, ray) in rays.iter().enumerate() {
         let truth = truth.closest(&TruthRay::new(ray.origin, ray.direction, ray.t_min.max(0.0), ray.t_max));
         assert_eq!(met(&hits[number]), truth.map(|hit| (hit.t, hit.id)), "ray {number}");

@@ -15,7 +15,7 @@ pub(super) struct Top {
     /// In the frame.
     pub(super) nodes: Vec<Node>,
     /// Boxes of their children, world units.
-    boxes: Vec<Boxes<8>>,
+    pub(super) boxes: Vec<Boxes<8>>,
     /// Of the scene's middle.
     pub(super) frame: Frame,
     /// `None`: the scene is empty.

@@ -41,16 +41,46 @@ pub(super) fn elements(open: Open) -> Option<Range<u32>> {
     (number & LEAF != 0).then_some(first..first + (number & 3) + 1)
 }
 
-/// The number of what a node has in a slot, if there is something.
+/// The number of what `number` names in a tree that is part of another: its nodes come after `nodes` of that, its
+/// elements after `elements`.
 #[inline(always)]
-pub(super) fn child(node: &Node, slot: u32) -> Option<u32> {
-    let what = u32::from(node.meta[slot as usize]);
-    if u32::from(node.inner_mask) >> slot & 1 != 0 {
-        Some(node.child_base + inner_before(u32::from(node.inner_mask), slot))
-    } else if what != 0 {
-        Some(LEAF | (node.triangle_base + (what & 31)) << 2 | ((what >> 5).count_ones() - 1))
-    } else {
-        None
+pub(super) fn moved(number: u32, nodes: u32, elements: u32) -> u32 {
+    number + if number & LEAF != 0 { elements << 2 } else { nodes }
+}
+
+/// A node of up to eight children.
+pub(super) trait Branch {
+    /// The number of what it has in a slot, if there is something. Implementations are always inlined.
+    fn child(&self, slot: u32) -> Option<u32>;
+
+    /// Step and origin of the grid of its bounds on an axis. Implementations are always inlined.
+    fn grid(&self, axis: usize) -> (f32, f32);
+
+    /// The lower bounds of its children on an axis, or the upper ones, in steps. Implementations are always inlined.
+    fn bounds<I: Isa>(&self, isa: I, axis: usize, is_upper: bool) -> I::Eight;
+}
+
+impl Branch for Node {
+    #[inline(always)]
+    fn child(&self, slot: u32) -> Option<u32> {
+        let what = u32::from(self.meta[slot as usize]);
+        if u32::from(self.inner_mask) >> slot & 1 != 0 {
+            Some(self.child_base + inner_before(u32::from(self.inner_mask), slot))
+        } else if what != 0 {
+            Some(LEAF | (self.triangle_base + (what & 31)) << 2 | ((what >> 5).count_ones() - 1))
+        } else {
+            None
+        }
+    }
+
+    #[inline(always)]
+    fn grid(&self, axis: usize) -> (f32, f32) {
+        (f32::from_bits(u32::from(self.exponent[axis]) << 23), self.origin[axis])
+    }
+
+    #[inline(always)]
+    fn bounds<I: Isa>(&self, isa: I, axis: usize, is_upper: bool) -> I::Eight {
+        isa.numbers(if is_upper { &self.hi[axis] } else { &self.lo[axis] })
     }
 }
 
@@ -66,10 +96,10 @@ pub(super) fn extent(nodes: &[Node]) -> f32 {
 }
 
 /// What asks the boxes of a node's children.
-pub(super) trait Asks {
+pub(super) trait Asks<B: Branch> {
     /// Which children may matter, a bit each, and how near each is at least, no negative number: those no farther than
     /// `limit`. Implementations are always inlined.
-    fn ask<I: Isa>(&self, isa: I, node: &Node, limit: f32) -> (u32, [f32; 8]);
+    fn ask<I: Isa>(&self, isa: I, node: &B, limit: f32) -> (u32, [f32; 8]);
 }
 
 /// Calls `visit` for the leaves of a tree that `asks` may meet, with the elements of each and how near they are at
@@ -78,10 +108,10 @@ pub(super) trait Asks {
 /// Of a node's children the nearest is the next. The others wait in any order: most are too far by then, and sorting
 /// them costs more than it saves.
 #[inline(always)]
-pub(super) fn walk<I: Isa>(
+pub(super) fn walk<I: Isa, B: Branch>(
     isa: I,
-    nodes: &[Node],
-    asks: &impl Asks,
+    nodes: &[B],
+    asks: &impl Asks<B>,
     mut limit: f32,
     open: &mut Vec<Open>,
     mut visit: impl FnMut(Range<u32>, f32) -> Option<f32>,
@@ -105,17 +135,34 @@ pub(super) fn walk<I: Isa>(
             }
             continue;
         }
-        let node = &nodes[next.number() as usize];
-        let (mut left, near) = asks.ask(isa, node, limit);
-        while left != 0 {
-            let slot = left.trailing_zeros();
-            left &= left - 1;
-            let Some(number) = child(node, slot) else { continue };
-            let own = Open::new(near[slot as usize], number);
-            nearest = Some(nearest.map_or(own, |before| {
+        nearest = nearest_child(isa, &nodes[next.number() as usize], asks, limit, open);
+    }
+}
+
+/// The nearest of the children of a node that `asks` may meet up to `limit`, if there is one; `open` gets the others.
+#[inline(always)]
+pub(super) fn nearest_child<I: Isa, B: Branch>(
+    isa: I,
+    node: &B,
+    asks: &impl Asks<B>,
+    limit: f32,
+    open: &mut Vec<Open>,
+) -> Option<Open> {
+    let (mut left, near) = asks.ask(isa, node, limit);
+    let mut nearest: Option<Open> = None;
+    while left != 0 {
+        let slot = left.trailing_zeros();
+        left &= left - 1;
+        let Some(number) = node.child(slot) else { continue };
+        let own = Open::new(near[slot as usize], number);
+        nearest = Some(nearest.map_or(
+            own,
+            #[inline(always)]
+            |before| {
                 open.push(before.max(own));
                 before.min(own)
-            }));
-        }
+            },
+        ));
     }
+    nearest
 }
