@@ -7,7 +7,7 @@
 //! the lattice. Where it does not, boxes are asked in f64. One distance for all is as good, for units are small beside
 //! the grids of nodes, and it leaves little to be computed of a node before its boxes are.
 
-use super::aims::{Aims, LEAST_STEP, Locals, MOVED, ROUNDED, Told, inverse};
+use super::aims::{Aims, GROWN, LEAST_STEP, Locals, MOVED, ROUNDED, Told, inverse};
 use super::given::Columns;
 use super::room::Inner;
 use super::space::{Geometry, Placed, Slabs};
@@ -126,7 +126,7 @@ impl Aim {
         let at = (object.transform_point3(near + way * from) - origin) * per_unit;
         let told = Told { factor: direction.scaled(1.0) * per_unit, from, slack: LEAST_STEP * step * per_unit };
         let inverse = inverse(&three!(k => [direction.direction[k]]));
-        let locals = Locals::new((&three!(k => [at[k]]), extent), &inverse, told, &self.begins());
+        let locals = Locals::new((&three!(k => [at[k]]), extent, GROWN), &inverse, told, &self.begins());
         Some(Local::new(locals, &inverse))
     }
 

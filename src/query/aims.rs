@@ -208,7 +208,19 @@ impl<const N: usize> Aims<N> {
 
     /// The rays in a frame in world directions that has its origin at `origin`, from `from` on.
     #[inline(always)]
-    pub(super) fn locals(&self, (origin, extent): (DVec3, f32), per_unit: f64, (from, step): (f64, f64)) -> Locals<N> {
+    pub(super) fn locals(&self, frame: (DVec3, f32), per_unit: f64, from: (f64, f64)) -> Locals<N> {
+        self.locals_grown(frame, per_unit, from, GROWN)
+    }
+
+    /// The same where boxes are grown by other units of distances.
+    #[inline(always)]
+    pub(super) fn locals_grown(
+        &self,
+        (origin, extent): (DVec3, f32),
+        per_unit: f64,
+        (from, step): (f64, f64),
+        grown: f32,
+    ) -> Locals<N> {
         let mut at = [[0.0; N]; 3];
         for k in 0..3 {
             for (at, (near, way)) in at[k].iter_mut().zip(self.near[k].iter().zip(&self.way[k])) {
@@ -216,7 +228,7 @@ impl<const N: usize> Aims<N> {
             }
         }
         let told = Told { factor: per_unit, from, slack: LEAST_STEP * step * per_unit };
-        Locals::new((&at, extent), &self.inverse, told, &self.begins())
+        Locals::new((&at, extent, grown), &self.inverse, told, &self.begins())
     }
 }
 
@@ -254,10 +266,11 @@ pub(super) struct Locals<const N: usize> {
 }
 
 impl<const N: usize> Locals<N> {
-    /// Rays that begin `at` there, in their intervals at `begins` along them; `extent` is that of the frame's boxes.
+    /// Rays that begin `at` there, in their intervals at `begins` along them; `extent` is that of the frame's boxes,
+    /// which are grown by so many units of distances.
     #[inline(always)]
     pub(super) fn new(
-        (at, extent): (&[[f64; N]; 3], f32),
+        (at, extent, units): (&[[f64; N]; 3], f32, f32),
         inverse: &[[f32; N]; 3],
         told: Told,
         begins: &[f64; N],
@@ -271,7 +284,7 @@ impl<const N: usize> Locals<N> {
         }
         for k in 0..3 {
             for i in 0..N {
-                let (origin, on) = (at[k][i] as f32, (GROWN * (grown[i] + extent)).copysign(inverse[k][i]));
+                let (origin, on) = (at[k][i] as f32, (units * (grown[i] + extent)).copysign(inverse[k][i]));
                 (ahead[k][i], behind[k][i]) = (origin + on, origin - on);
             }
         }

@@ -5,7 +5,7 @@
 //! is that of the bricks, and its triangles are decided in f64 by the same numbers, so hits are the same. It takes two
 //! to three times the bytes of bricks.
 
-use super::aims::{Aims, GROWN, Locals};
+use super::aims::{Aims, Locals};
 use super::space::{Boxes, Geometry, Placed, world};
 use super::top::Top;
 use super::walk::{Branch, moved};
@@ -13,6 +13,7 @@ use super::{Queries, Watch};
 use crate::kernels::opacity;
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::simd::isa::Isa;
+use crate::kernels::trace::node::UNIT;
 use crate::stream::Item;
 use anyhow::Result;
 use bricks::{BRICK_WIDE, Leaf, Resident, SURFACE_ROTATION_SHIFT};
@@ -20,6 +21,15 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Units of distances by which boxes are grown. What is rounded of a ray and of distances to planes is 6 of them
+/// together: two of the inverse, one each of the origin, of moving it, of products and of their sum. Bricks need more,
+/// for rays are moved to where they enter one.
+const GROWN: f32 = 16.0 * UNIT;
+
+/// Scenes that lie farther from the world's origin, in their own extents, have no tree: f64 moves rays there from afar
+/// by less than a unit of these.
+const FARTHEST: f64 = (1u64 << 25) as f64;
 
 /// By how much the boxes of a brick's triangles may grow in area, all together, for what f32 does not know.
 const MOST_GROWN: f64 = 1.25;
@@ -151,6 +161,11 @@ impl Flat {
     /// A damaged brick; what `watch` says.
     fn new(queries: &Queries, watch: &mut Watch) -> Result<Option<Self>> {
         let (resident, top) = (queries.scene.resident(), queries.top());
+        let extent = top.reach();
+        if top.far > FARTHEST * extent {
+            return Ok(None);
+        }
+        let grown = 4.0 * f64::from(GROWN) * extent * top.per_unit;
         let [nodes, triangles] = totals(resident);
         let mut nodes = vec![FlatNode::EMPTY; nodes as usize];
         let mut triangles = vec![FlatTriangle::default(); triangles as usize];
@@ -174,7 +189,7 @@ impl Flat {
                 let bytes = &payloads[brick(part.leaf) - place];
                 let geometry = Geometry::new(resident, brick(part.leaf) as u32, bytes, &[]);
                 let placed = Placed::new(resident, part.leaf, &geometry);
-                is_told_apart.fetch_and(part.fill(top, &placed), Ordering::Relaxed);
+                is_told_apart.fetch_and(part.fill((top, grown), &placed), Ordering::Relaxed);
                 let place = Place { origin: geometry.origin, unit: geometry.unit, matrix: placed.matrix.copied() };
                 (part.leaf, place)
             };
@@ -210,7 +225,7 @@ impl Flat {
     /// Rays in its frame.
     #[inline(always)]
     pub(super) fn locals<const N: usize>(&self, top: &Top, aims: &Aims<N>) -> Locals<N> {
-        aims.locals((top.frame.origin, self.extent), top.per_unit, (0.0, top.step))
+        aims.locals_grown((top.frame.origin, self.extent), top.per_unit, (0.0, top.step), GROWN)
     }
 
     /// The vertices of a triangle as they are stored, world units: those of [`Placed::vertices`].
@@ -268,8 +283,8 @@ impl<'a> Left<'a> {
 }
 
 impl Part<'_> {
-    /// Fills it in from a brick. Returns whether f32 tells its boxes apart.
-    fn fill(&mut self, top: &Top, placed: &Placed) -> bool {
+    /// Fills it in from a brick. Returns whether f32 tells its boxes apart, which are grown by so much.
+    fn fill(&mut self, (top, grown): (&Top, f64), placed: &Placed) -> bool {
         let (view, pad) = (&placed.geometry.view, placed.pad());
         for (number, triangle) in self.triangles.iter_mut().enumerate() {
             *triangle = FlatTriangle {
@@ -280,7 +295,6 @@ impl Part<'_> {
             };
         }
         let (mut area, mut grown_area) = (0.0, 0.0);
-        let grown = 2.0 * f64::from(GROWN) * 2.0 * f64::from(top.extent);
         for (node, of) in self.nodes.iter_mut().zip(view.nodes) {
             let boxes = placed.boxes(of, pad);
             for slot in 0..8 {

@@ -27,7 +27,9 @@ pub(super) struct Top {
     /// The greatest coordinate of boxes in the frame.
     pub(super) extent: f32,
     /// The greatest coordinate of anything in the scene.
-    far: f64,
+    pub(super) far: f64,
+    /// Its lower and upper corner.
+    corners: [DVec3; 2],
 }
 
 /// What a child of a node is.
@@ -73,7 +75,14 @@ impl Top {
             surroundings: Surroundings::new(resident),
             step,
             far: corners[0].abs().max(corners[1].abs()).max_element(),
+            corners,
         }
+    }
+
+    /// The greatest coordinate of anything in the scene as the frame has it, world units.
+    pub(super) fn reach(&self) -> f64 {
+        let [low, high] = self.corners.map(|corner| (corner - self.frame.origin).abs());
+        low.max(high).max_element()
     }
 
     /// Of each node, whether there is a leaf below it for which `has` holds.

@@ -53,6 +53,11 @@ impl Kind for Asked {
             truth.ids().filter_map(|id| truth.vertices(id)).map(|of| of.map(DVec3::from_array)).collect();
         let rays: Vec<Ray> = (0..MOST).filter_map(|_| ray(&mut random, &file, &corners)).collect();
         let points: Vec<[f64; 3]> = (0..MOST).map(|_| point(&mut random, &file).to_array()).collect();
+        // After many rays a scene that is kept becomes one tree.
+        if random.chance(50) {
+            let many: Vec<Ray> = rays.iter().cycle().take(MOST + corners.len()).copied().collect();
+            queries.any(&many, &mut |_| Ok(())).map_err(|error| refused(&error))?;
+        }
         check(&queries, &truth, &rays, &points)
     }
 }
