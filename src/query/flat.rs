@@ -7,7 +7,7 @@
 
 use super::aims::{Aims, Locals};
 use super::space::{Boxes, Geometry, Placed, world};
-use super::top::Top;
+use super::top::{self, Top};
 use super::walk::{Branch, moved};
 use super::{Queries, Watch};
 use crate::kernels::opacity;
@@ -16,7 +16,7 @@ use crate::kernels::simd::isa::Isa;
 use crate::kernels::trace::node::UNIT;
 use crate::stream::Item;
 use anyhow::Result;
-use bricks::{BRICK_WIDE, Leaf, Resident, SURFACE_ROTATION_SHIFT};
+use bricks::{BRICK_WIDE, Leaf, Node, Resident, SURFACE_ROTATION_SHIFT};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -53,6 +53,20 @@ pub(super) struct FlatNode {
 impl FlatNode {
     /// One without children: boxes that nothing meets.
     const EMPTY: Self = Self { bounds: [[[f32::INFINITY; 8]; 3], [[f32::NEG_INFINITY; 8]; 3]], children: [0; 8] };
+
+    /// A node like `of`, whose children have these boxes: in the frame of the top level, rounded outward. What its
+    /// children are is left open.
+    fn new(of: &Node, top: &Top, boxes: &Boxes<8>) -> Self {
+        let (mut node, [low, high]) = (Self::EMPTY, boxes.grown());
+        for k in 0..3 {
+            let in_frame = |x: f64| ((x - top.frame.origin[k]) * top.per_unit) as f32;
+            for slot in (0..8).filter(|&slot| of.meta[slot] != 0) {
+                node.bounds[0][k][slot] = in_frame(low[k][slot]).next_down();
+                node.bounds[1][k][slot] = in_frame(high[k][slot]).next_up();
+            }
+        }
+        node
+    }
 }
 
 impl Branch for FlatNode {
@@ -143,16 +157,6 @@ pub(super) fn bytes(resident: &Resident) -> Option<u64> {
     has_one.then_some(nodes * size_of::<FlatNode>() as u64 + triangles * size_of::<FlatTriangle>() as u64)
 }
 
-/// The boxes in the frame of the top level, rounded outward.
-fn framed(top: &Top, boxes: &Boxes<8>, slot: usize, node: &mut FlatNode) {
-    let [low, high] = boxes.grown();
-    for k in 0..3 {
-        let in_frame = |x: f64| ((x - top.frame.origin[k]) * top.per_unit) as f32;
-        node.bounds[0][k][slot] = in_frame(low[k][slot]).next_down();
-        node.bounds[1][k][slot] = in_frame(high[k][slot]).next_up();
-    }
-}
-
 impl Flat {
     /// The tree of a scene for which [`bytes`] says how many it takes. `None`: bricks are much smaller than the scene,
     /// so that f32 does not tell their boxes apart in one frame.
@@ -203,12 +207,12 @@ impl Flat {
             return Ok(None);
         }
         for ((node, of), boxes) in above.iter_mut().zip(&top.nodes).zip(&top.boxes) {
+            *node = FlatNode::new(of, top, boxes);
             for slot in 0..8 {
                 if let Some(number) = of.child(slot) {
-                    framed(top, boxes, slot as usize, node);
-                    node.children[slot as usize] = match super::top::child(of, slot as usize) {
-                        super::top::Child::Node(_) => number,
-                        super::top::Child::Leaf(leaf) => roots[leaf as usize],
+                    node.children[slot as usize] = match top::child(of, slot as usize) {
+                        top::Child::Node(_) => number,
+                        top::Child::Leaf(leaf) => roots[leaf as usize],
                     };
                 }
             }
@@ -296,10 +300,9 @@ impl Part<'_> {
         }
         let (mut area, mut grown_area) = (0.0, 0.0);
         for (node, of) in self.nodes.iter_mut().zip(view.nodes) {
-            let boxes = placed.boxes(of, pad);
+            *node = FlatNode::new(of, top, &placed.boxes(of, pad));
             for slot in 0..8 {
                 let Some(number) = of.child(slot) else { continue };
-                framed(top, &boxes, slot as usize, node);
                 node.children[slot as usize] = moved(number, self.first[0], self.first[1]);
                 let [low, high] = &node.bounds;
                 let [x, y, z] = [0, 1, 2].map(|k| f64::from(high[k][slot as usize] - low[k][slot as usize]));
