@@ -136,7 +136,7 @@ impl Queries {
     /// Asks `scene`, with a cache of host memory, of which what is in use takes a quarter or 4 MiB; on so many threads,
     /// 0 for as many as the processor has. By itself the cache holds all or takes a quarter of the memory that is
     /// available. All is geometry and attributes, and room for what is in use beside them; and where there is room, or
-    /// 100 % is asked for, the scene as one tree, which many rays take less time in.
+    /// 100 % is asked for and it fits into that quarter, the scene as one tree, in which many rays take less time.
     ///
     /// # Errors
     /// A thread cannot be started.
@@ -144,7 +144,9 @@ impl Queries {
         let all = all_bytes(&scene);
         let room = available_memory().map_or(UNKNOWN, |bytes| bytes / 4);
         let bricks = all + all / 2 + BESIDE;
-        let has_room = |tree: &u64| cache.bytes(bricks + tree, room) >= bricks + tree;
+        // A share is of bricks: who asks for all of them need not have so much more memory.
+        let may_have = |tree: u64| matches!(cache, CacheSize::Bytes(_)) || tree <= room;
+        let has_room = |&tree: &u64| may_have(tree) && cache.bytes(bricks + tree, room) >= bricks + tree;
         let flat_bytes = flat::bytes(scene.resident()).filter(has_room);
         let tree = flat_bytes.unwrap_or(0);
         let cache_bytes = cache.bytes(bricks + tree, room) - tree;
