@@ -18,10 +18,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
 /// Items that a thread takes at a time, some times [`MANY`].
-const TASK: usize = 32 * MANY;
+pub(super) const TASK: usize = 32 * MANY;
 
 /// Items after which it is told how far work is, some times that.
-const TOLD: usize = 1 << 18;
+pub(super) const TOLD: usize = 1 << 18;
 
 /// What looks for something.
 pub(super) trait Seek: Sync {

@@ -7,6 +7,7 @@ use super::given::Rays;
 use super::hits::normal;
 use super::packet::{ALL, MANY, Packet};
 use super::room::Joint;
+use super::rounds::{TASK, TOLD};
 use super::top::Top;
 use super::walk::{Asks, Branch, Open, elements, nearest_child};
 use super::{Queries, Watch};
@@ -23,14 +24,8 @@ use std::ops::Range;
 /// Rays that take turns: enough that memory is there when one's turn comes.
 const TURNS: usize = 16;
 
-/// Rays that a thread takes at a time, some times [`MANY`].
-const TASK: usize = 32 * MANY;
-
 /// Room for what a ray comes to later, at first.
 const ROOM: usize = 32;
-
-/// Rays after which it is told how far work is, some times that.
-const TOLD: usize = 1 << 18;
 
 const NOTHING: Hit = Hit { t: f64::INFINITY, triangle: NONE, u: 0.0, v: 0.0, normal: [0.0; 3] };
 
