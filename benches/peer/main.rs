@@ -155,14 +155,14 @@ fn main() {
     for city_of in cities {
         let path = city(&city_of);
         let dump = path.with_extension("dump");
-        let scene = Scene::new(&path);
+        let scene = Scene::new(&path, false);
         let triangles = scene.dump(&dump).expect("a dump");
         let traced = |rays: &Vec<Ray>| rays.iter().filter(|ray| ray.t_min <= ray.t_max).count();
         let traced = scene.sets.each_ref().map(traced);
         let rays = scene.sets.each_ref().map(|rays| squares().into_iter().map(|pixel| rays[pixel]).collect());
         drop(scene);
         let input = Input { triangles: ours::triangles(&dump, &rays), rays };
-        let mut peers: Vec<Box<dyn Peer>> = vec![Box::new(Ours::new(&path))];
+        let mut peers: Vec<Box<dyn Peer>> = vec![Box::new(Ours::new(&path, true)), Box::new(Ours::new(&path, false))];
         for program in &programs {
             peers.push(Box::new(Program::new(program, &dump, input.rays[0].len())));
         }

@@ -14,7 +14,7 @@ use brickwalk::scene::path::CameraPath;
 use brickwalk::schedule::{Lamp, Pass, Step};
 use brickwalk::session::opened::{Opened, open_scene};
 use brickwalk::settings::{Adapter, CacheSize, ImageSize, Schedule};
-use brickwalk::stream::Item;
+use brickwalk::stream::{Item, PayloadSource};
 use glam::DVec3;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -51,16 +51,18 @@ pub struct Scene {
 }
 
 impl Scene {
-    pub fn new(path: &Path) -> Self {
+    /// With bricks that are flat, or as they lie in the file.
+    pub fn new(path: &Path, is_flat: bool) -> Self {
+        let scene = open_scene(path).expect("the scene");
         let settings = Settings {
             adapter: Adapter::Cpu,
-            cache: CacheSize::Percent(100.0),
+            // This holds all, and nothing beside.
+            cache: if is_flat { CacheSize::Percent(100.0) } else { CacheSize::Bytes(scene.sizes().sum()) },
             schedule: Schedule::Plain,
             size: ImageSize { width: EXTENT.width, height: EXTENT.height },
             tile: EXTENT.tile,
             ..Settings::exact()
         };
-        let scene = open_scene(path).expect("the scene");
         let mut session = Opened::open(scene.clone(), path, &settings).expect("a session");
         let camera = CameraPath::read(&path.with_extension("near.json")).expect("its path").frame(0, 30);
         let frame = Frame::near(scene.resident(), camera.position);
@@ -91,6 +93,11 @@ impl Scene {
             let t_min = (START / frame.unit) as f32;
             occlusion.push(leaving(hit, surface, [t_min, (OCCLUSION_LENGTH / frame.unit) as f32], &mut state));
             diffuse.push(leaving(hit, surface, [t_min, T_INFINITE], &mut state));
+        }
+        // As after some frames: bricks are made flat once that has paid.
+        let triangles: u64 = scene.session.scene.resident().bricks.iter().map(|b| u64::from(b.triangle_count)).sum();
+        for _ in 0..=triangles / EXTENT.rays() as u64 {
+            scene.trace(1, true);
         }
         scene
     }
@@ -187,13 +194,13 @@ struct Worker {
 }
 
 impl Worker {
-    fn new(path: PathBuf, is_alone: bool) -> Self {
+    fn new(path: PathBuf, is_flat: bool, is_alone: bool) -> Self {
         let (questions, asked) = channel::<(usize, usize)>();
         let (answer, answers) = channel();
         std::thread::spawn(move || {
             let alone = || rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
             let _pool = is_alone.then(|| alone().expect("a pool of this thread"));
-            let mut scene = Scene::new(&path);
+            let mut scene = Scene::new(&path, is_flat);
             for (mode, set) in asked {
                 // Nobody listens after the last answer that is wanted.
                 let _ = answer.send(scene.measure(set, mode == 0));
@@ -211,12 +218,14 @@ pub struct Ours {
 }
 
 impl Ours {
-    pub fn new(path: &Path) -> Self {
+    /// With bricks that are flat, or as they lie in the file.
+    pub fn new(path: &Path, is_flat: bool) -> Self {
         let modes = ["root", "lists"].map(String::from).to_vec();
+        let title = if is_flat { "ours" } else { "ours, packed" };
         Self {
-            columns: vec![Column { title: "ours".into(), modes }],
-            one: Worker::new(path.into(), true),
-            all: Worker::new(path.into(), false),
+            columns: vec![Column { title: title.into(), modes }],
+            one: Worker::new(path.into(), is_flat, true),
+            all: Worker::new(path.into(), is_flat, false),
         }
     }
 }

@@ -1,10 +1,12 @@
 //! The payloads that are resident: verified bytes in host memory, shared with the host cache, and the places that they
 //! take of the budget.
 
+use crate::kernels::flat::FlatBrick;
 use crate::kernels::payloads::{AttributeView, BrickView};
 use crate::schedule::{BrickStates, ExecutorError, Load};
 use crate::stream::{Item, Shared, Slot, Workers};
-use bricks::{Resident, SceneFile};
+use bricks::{Brick, Resident, SceneFile};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -20,6 +22,8 @@ pub struct BrickCache {
 struct Held {
     place: Slot,
     bytes: Arc<[u8]>,
+    /// Of geometry, the form that is walked faster, once it has been made.
+    flat: Option<FlatBrick>,
 }
 
 impl BrickCache {
@@ -45,7 +49,7 @@ impl BrickCache {
         let loaded = workers.load(requests)?;
         for (load, (item, Shared(payload))) in loads.iter().zip(loaded) {
             self.places.insert(load.slot, (scene.loaded_bytes(item.into()), item));
-            self.held[item.index()] = payload.map(|bytes| Held { place: load.slot, bytes });
+            self.held[item.index()] = payload.map(|bytes| Held { place: load.slot, bytes, flat: None });
         }
         Ok(())
     }
@@ -67,6 +71,43 @@ impl BrickCache {
         }
     }
 
+    /// The bricks whose geometry is resident and could be flat.
+    fn geometry_held<'a>(&'a mut self, resident: &'a Resident) -> impl Iterator<Item = (&'a Brick, &'a mut Held, u64)> {
+        let first = Item::geometry(0).index();
+        let held = self.held.iter_mut().skip(first).step_by(Item::geometry(1).index() - first);
+        let all = resident.bricks.iter().zip(held);
+        all.filter_map(|(brick, held)| Some((brick, held.as_mut()?, FlatBrick::bytes_of(brick)?)))
+    }
+
+    /// Makes resident bricks flat, as far as `room` bytes hold all that are, if so many rays have come as they have
+    /// triangles: about so many gain what making them takes. Returns those rays.
+    pub fn flatten(&mut self, resident: &Resident, rays: u64, room: u64) -> u64 {
+        let (mut left, mut triangles) = (room, 0);
+        let mut waiting = Vec::new();
+        for (brick, held, bytes) in self.geometry_held(resident) {
+            if held.flat.is_some() {
+                left = left.saturating_sub(bytes);
+            } else {
+                waiting.push((brick, held, bytes));
+            }
+        }
+        waiting.retain(|&(brick, _, bytes)| {
+            let fits = bytes <= left;
+            if fits {
+                left -= bytes;
+                triangles += u64::from(brick.triangle_count);
+            }
+            fits
+        });
+        if rays < triangles {
+            return 0;
+        }
+        waiting.into_par_iter().for_each(|(brick, held, _)| {
+            held.flat = BrickView::new(brick, &held.bytes, &[]).flattened(brick.triangle_count);
+        });
+        triangles
+    }
+
     /// Every brick's geometry, with the table `opacity` ([`crate::kernels::opacity`]); of bricks that are not resident,
     /// nothing.
     ///
@@ -80,7 +121,7 @@ impl BrickCache {
         opacity: &'a [[u32; 4]],
     ) -> Result<Vec<BrickView<'a>>, ExecutorError> {
         let view = |(i, brick)| match &self.held[Item::geometry(i as u32).index()] {
-            Some(held) => Ok(BrickView::new(brick, &held.bytes, opacity)),
+            Some(held) => Ok(BrickView::new(brick, &held.bytes, opacity).with(held.flat.as_ref())),
             None if all || bricks.geometry(i).is_some() => Err(missing(Item::geometry(i as u32))),
             None => Ok(BrickView::default()),
         };

@@ -80,6 +80,10 @@ pub struct CpuExecutor {
     tuning: Tuning,
     pairs_are_culled: bool,
     count: bool,
+    /// [`Setup::flat_bytes`].
+    flat_bytes: u64,
+    /// Rays that gain from bricks that are flat, but for those that some have been made for.
+    rays: u64,
     /// Whether textures are looked up; beside this, kernels decide as they run.
     samples: bool,
     isa: Best,
@@ -94,7 +98,7 @@ impl CpuExecutor {
     /// # Errors
     /// Textures that cannot be read.
     pub fn new(file: Arc<SceneFile>, workers: Workers, setup: Setup) -> Result<Self, ExecutorError> {
-        let Setup { extent, count, opaque, keep, .. } = setup;
+        let Setup { extent, count, opaque, keep, flat_bytes, .. } = setup;
         let rays = extent.rays();
         let sets = [RaySet::new(rays), RaySet::new(rays), RaySet::new(0)];
         let tiles = TileLists::new(extent.tiles() as usize);
@@ -121,10 +125,22 @@ impl CpuExecutor {
             tuning: Tuning::new(&setup),
             pairs_are_culled: false,
             count,
+            flat_bytes,
+            rays: 0,
             isa: Best::detect(),
             file,
             workers,
         })
+    }
+
+    /// Makes bricks flat that the rays of a pass will meet, once that pays. Camera rays gain little. Nodes and triangles
+    /// are counted as those of packed bricks.
+    fn flatten(&mut self, pass: Pass, steps: &[Step]) {
+        let gains = pass != Pass::Primary && steps.iter().any(|step| step.is_intersection());
+        if gains && self.flat_bytes > 0 && !self.count {
+            self.rays += self.rows_of(pass).rays() as u64;
+            self.rays -= self.cache.flatten(self.file.resident(), self.rays, self.flat_bytes);
+        }
     }
 
     /// The rows that the rays of a pass lie in.
@@ -267,6 +283,7 @@ impl Executor for CpuExecutor {
         let rows = self.rows_of(pass);
         self.buffers.tiles.resize(rows.tiles() as usize);
         let params = self.params(rows);
+        self.flatten(pass, steps);
         let resident = self.file.resident();
         let needs_all = steps.iter().any(|step| matches!(step, Step::IntersectAll | Step::IntersectBinary));
         let geometry = self.cache.geometry(resident, bricks, needs_all, &self.opacity)?;

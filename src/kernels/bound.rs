@@ -225,6 +225,12 @@ impl<'a> Bound<'a> {
         self.slots[brick].state & self.params.select_mask == self.params.select_want
     }
 
+    /// Whether [`Bound::note_use`] has been told of the brick of a leaf in this submission.
+    #[inline(always)]
+    pub fn is_used(&self, leaf: u32) -> bool {
+        self.demand[self.brick_of(leaf)].rays.load(Ordering::Relaxed) != 0
+    }
+
     /// Notes that a ray enters a child box of the brick's root: what a resident brick's demand says (the host knows
     /// which are). Most rays find it noted, and only read.
     #[inline(always)]

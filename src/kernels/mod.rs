@@ -13,6 +13,7 @@ pub mod denoise;
 pub mod dispatch;
 pub mod emitter_groups;
 pub mod emitters;
+pub mod flat;
 pub mod frame;
 mod frame_executor;
 pub mod lamps;

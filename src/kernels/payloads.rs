@@ -1,5 +1,6 @@
 //! The payloads of bricks where they lie, as the arrays that twins read: geometry and attributes.
 
+use super::flat::FlatBrick;
 use super::layout::BRICK_WIDE;
 use super::vector::{Vec3, each};
 use crate::math::exact::barrier;
@@ -23,6 +24,8 @@ pub struct BrickView<'a> {
     is_wide: bool,
     /// Which rays pass through its triangles.
     pub opacity: OpacityView<'a>,
+    /// The same in the form that is walked faster, where there is one.
+    pub flat: Option<&'a FlatBrick>,
 }
 
 impl<'a> BrickView<'a> {
@@ -46,7 +49,20 @@ impl<'a> BrickView<'a> {
                 table,
             },
             is_wide: brick.flags & BRICK_WIDE != 0,
+            flat: None,
         }
+    }
+
+    /// The same with its other form, where there is one.
+    pub fn with(self, flat: Option<&'a FlatBrick>) -> Self {
+        Self { flat, ..self }
+    }
+
+    /// Its other form, of so many triangles. `None`: the brick is wide.
+    pub fn flattened(&self, triangles: u32) -> Option<FlatBrick> {
+        let corner = |index: u32| each(|k| self.vertices[3 * index as usize + k]);
+        let triangle = |number: u32| (self.indices.of(number).map(corner), self.ids[number as usize]);
+        (!self.is_wide).then(|| FlatBrick::new(self.nodes, (0..triangles).map(triangle)))
     }
 
     /// A vertex in the object's frame, in which the brick's origin lies at the offset: the correctly rounded difference
@@ -86,6 +102,11 @@ impl<'a> BrickView<'a> {
     /// The vertices of a triangle in the object's frame.
     #[inline(always)]
     pub fn vertices(&self, triangle: u32, offset_high: Vec3, offset_low: Vec3) -> [Vec3; 3] {
+        if let Some(flat) = self.flat {
+            let [a, b, c] = flat.vertices(triangle);
+            let moved = |vertex: Vec3| each(|k| barrier(vertex[k] + offset_high[k]));
+            return [moved(a), moved(b), moved(c)];
+        }
         let [a, b, c] = self.indices.of(triangle);
         let vertex = |index| self.vertex(index, offset_high, offset_low);
         [vertex(a), vertex(b), vertex(c)]

@@ -51,6 +51,9 @@ pub struct Setup {
     pub opaque: bool,
     /// Triangles are hidden from the start, or soon ([`super::FrameExecutor::set_hidden`]).
     pub hides: bool,
+    /// Bytes that may be taken beside the cache for resident bricks in a form that takes less time
+    /// ([`super::flat`]); of the processor alone.
+    pub flat_bytes: u64,
     /// What is kept though the scene does not need it.
     pub keep: Keep,
 }

@@ -4,6 +4,7 @@ use super::bands::Bands;
 use super::device::Device;
 use super::hidden;
 use crate::cpu::available_memory;
+use crate::kernels::flat::FlatBrick;
 use crate::kernels::shade::more;
 use crate::kernels::{Extent, FrameExecutor, Keep, Setup};
 use crate::output::atomic;
@@ -15,7 +16,7 @@ use crate::settings::sizes::{counted, human_bytes, option_bytes};
 use crate::settings::{CacheSize, Schedule};
 use crate::stream::{HostCache, PayloadSource, Residency, ResidencyError, Sizes, Trace};
 use anyhow::{Context, Result, anyhow, bail};
-use bricks::{Access, SceneFile};
+use bricks::{Access, Resident, SceneFile};
 use std::path::Path;
 use std::sync::Arc;
 use tracing::info;
@@ -97,6 +98,19 @@ pub fn cache_budget(cache: CacheSize, sizes: &Sizes, page_bytes: u64, room: u64)
         CacheSize::Bytes(_) => asked,
         CacheSize::Auto | CacheSize::Percent(_) => asked.max(Residency::least_budget(sizes)),
     }
+}
+
+/// Bytes that bricks may take beside the cache in the form that the processor walks faster: those of all of them, where
+/// the cache holds everything, `for_all` bytes, and there is room for these, too. A share is of bricks as they lie in
+/// the file, so who asks for all of them gets the others where a cache that is not asked for would.
+fn flat_bytes(cache: CacheSize, resident: &Resident, for_all: u64, room: u64) -> u64 {
+    let bytes: u64 = resident.bricks.iter().filter_map(FlatBrick::bytes_of).sum();
+    let asked = match cache {
+        CacheSize::Bytes(bytes) => bytes,
+        CacheSize::Percent(percent) if percent < 100.0 => 0,
+        CacheSize::Auto | CacheSize::Percent(_) => room,
+    };
+    if for_all + bytes <= asked { bytes } else { 0 }
 }
 
 /// The rays of a tile with edges of `tile` rays that `--query-threshold` comes to: it counts those of a tile of 200 x
@@ -220,6 +234,7 @@ impl Opened {
             count: settings.count,
             opaque: settings.opaque,
             hides: !hidden.is_empty(),
+            flat_bytes: flat_bytes(settings.cache, scene.resident(), for_all, room),
             keep: Keep::default(),
         };
         let page_sizes: Vec<u64> = residency.page_sizes().collect();

@@ -171,7 +171,8 @@ settings! {
 
         /// Device memory for bricks and tiles of textures: a size, a share P% of all of them, or auto. A size must hold
         /// the two largest bricks. `auto`: all of them, if three quarters of the device's memory hold them, or half of
-        /// what is available on the processor.
+        /// what is available on the processor. What is left of that, or of a size, the processor uses for bricks in a
+        /// form that rays walk faster, if it holds all.
         cache: CacheSize = CacheSize::Auto, "--cache SIZE|P%|auto", Rule::Any, "", Cache, Common;
         /// Host memory for verified bricks: a size, or auto; 0 keeps none. `auto`: 1 GiB, or an eighth of the memory
         /// that is available where that is less.

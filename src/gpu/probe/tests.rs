@@ -35,7 +35,8 @@ fn executor(pages: usize, change: impl Fn(&str, String) -> String + Send + Sync 
     let scene = Arc::new(scene().unwrap());
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1).unwrap();
     let extent = Extent { width: 8, height: 8, tile: 8 };
-    let setup = Setup { extent, threshold: 0, count: false, opaque: false, hides: false, keep: Keep::default() };
+    let setup =
+        Setup { extent, threshold: 0, count: false, opaque: false, hides: false, flat_bytes: 0, keep: Keep::default() };
     Some(GpuExecutor::with_kernels(gpu, kernels, scene, workers, &[], setup).unwrap())
 }
 

@@ -90,8 +90,15 @@ fn trace(
     let mut cache = empty()?;
     let page_sizes: Vec<u64> = cache.residency.page_sizes().collect();
     let workers = Workers::new(scene.clone(), HostCache::new(0), 1)?;
-    let setup =
-        Setup { extent: EXTENT, threshold: 0, count: false, opaque: false, hides: false, keep: Keep::default() };
+    let setup = Setup {
+        extent: EXTENT,
+        threshold: 0,
+        count: false,
+        opaque: false,
+        hides: false,
+        flat_bytes: 0,
+        keep: Keep::default(),
+    };
     let (gpu, kernels) = (executor.gpu().clone(), executor.kernels().clone());
     let mut executor = GpuExecutor::with_kernels(gpu, kernels, scene, workers, &page_sizes, setup)?;
     executor.begin_frame(&View { frame, params: Params::default(), directions: Directions::default(), rays: None });

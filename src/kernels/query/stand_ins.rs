@@ -60,7 +60,7 @@ impl PacketKernel for Askers<'_> {
             if depth == 0 {
                 break;
             }
-            let (group, child, rays) = take(top, &mut depth, flip);
+            let (group, child, rays) = take(top, &mut depth, flip, f32::INFINITY);
             let rays = rays & !packet.done;
             let node = &bound.scene.top8[group.base as usize];
             let inner = u32::from(node.inner_mask);

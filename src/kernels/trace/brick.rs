@@ -47,7 +47,11 @@ impl BrickRay<'_> {
     /// The global id of a triangle.
     #[inline(always)]
     pub fn id(&self, triangle: u32) -> u32 {
-        self.base.wrapping_add(self.brick.ids[triangle as usize])
+        let own = match self.brick.flat {
+            Some(flat) => flat.id(triangle),
+            None => self.brick.ids[triangle as usize],
+        };
+        self.base.wrapping_add(own)
     }
 
     /// Tests one triangle and keeps the nearer hit; at equal distance the lower global id, so that no order shows.

@@ -62,7 +62,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
             if depth == 0 {
                 break;
             }
-            let (group, child, rays) = take(&mut packets.top, &mut depth, flip);
+            let (group, child, rays) = take(&mut packets.top, &mut depth, flip, f32::INFINITY);
             let rays = rays & !packets.packet.done;
             let node = &bound.scene.top8[group.base as usize];
             let inner = u32::from(node.inner_mask);

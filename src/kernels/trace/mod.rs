@@ -2,6 +2,8 @@
 
 pub mod binary_tree;
 pub mod brick;
+pub mod flat_node;
+pub mod flat_triangle;
 pub mod hidden;
 pub mod intersect_all;
 pub mod intersect_binary;
@@ -11,6 +13,7 @@ pub mod levels;
 pub mod node;
 pub mod opacity;
 pub mod packet;
+pub mod packet_flat;
 pub mod packet_node;
 pub mod packet_surface;
 pub mod packet_triangle;

@@ -2,6 +2,7 @@ use super::intersect_all::intersect_all;
 use super::run::Work;
 use crate::gpu::probe;
 use crate::kernels::bound::{Bound, Counters, Demand, Scene};
+use crate::kernels::flat::FlatBrick;
 use crate::kernels::frame::Frame;
 use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{COUNTER_NODES, COUNTER_TRIANGLES, Hit, NONE, PARAM_ANY_HIT, Params, Ray, Slot, Surface};
@@ -9,7 +10,7 @@ use crate::kernels::payloads::BrickView;
 use crate::kernels::rays::{RaySet, start_hit};
 use crate::kernels::simd::isa::{Best, Scalar};
 use crate::kernels::tiles::PairCounts;
-use bricks::{Payload, SceneFile};
+use bricks::{Brick, Payload, SceneFile};
 use std::sync::atomic::Ordering;
 
 /// What rays have found, and counted; bricks that they used.
@@ -19,6 +20,8 @@ struct Stage {
     file: SceneFile,
     scene: Scene,
     payloads: Vec<Vec<u32>>,
+    /// Of the bricks that are not wide.
+    flats: Vec<Option<FlatBrick>>,
 }
 
 impl Stage {
@@ -33,17 +36,25 @@ impl Stage {
             file.copy(payload, bytemuck::cast_slice_mut(&mut words)).unwrap();
             words
         };
-        let payloads = (0..file.resident().bricks.len() as u32).map(payload).collect();
-        (Self { file, scene, payloads }, frame)
+        let records = &file.resident().bricks;
+        let payloads: Vec<Vec<u32>> = (0..records.len() as u32).map(payload).collect();
+        let flat = |(record, words): (&Brick, &Vec<u32>)| {
+            BrickView::new(record, bytemuck::cast_slice(words), &[]).flattened(record.triangle_count)
+        };
+        let flats = records.iter().zip(&payloads).map(flat).collect();
+        (Self { file, scene, payloads, flats }, frame)
     }
 
-    /// Of `rays` in rows of `width`.
-    fn trace(&self, isa: Best, rays: &[Ray], width: u32, flags: u32) -> Found {
+    /// Of `rays` in rows of `width`, in bricks as they are or flat.
+    fn trace(&self, isa: Best, rays: &[Ray], (width, is_flat): (u32, bool), flags: u32) -> Found {
         let records = &self.file.resident().bricks;
         let views: Vec<BrickView> = records
             .iter()
             .zip(&self.payloads)
-            .map(|(b, words)| BrickView::new(b, bytemuck::cast_slice(words), &[]))
+            .zip(&self.flats)
+            .map(|((b, words), flat)| {
+                BrickView::new(b, bytemuck::cast_slice(words), &[]).with(flat.as_ref().filter(|_| is_flat))
+            })
             .collect();
         let params = Params {
             width,
@@ -97,7 +108,7 @@ impl Stage {
             let untraced = Ray { t_min: 1.0, t_max: 0.0, direction: [1.0, 0.0, 0.0], ..Ray::default() };
             let mut row = vec![untraced; i % 320 + 1];
             row[i % 320] = rays[i];
-            let width = row.len() as u32;
+            let width = (row.len() as u32, false);
             let (hits, surfaces, counted, used) = self.trace(Best::Scalar(Scalar), &row, width, flags);
             all.0.push(hits[i % 320]);
             all.1.push(surfaces[i % 320]);
@@ -128,7 +139,7 @@ fn rays_that_go_together_find_and_count_what_each_does_alone() {
             let hits = alone.0.iter().filter(|hit| hit[1] != NONE).count();
             assert!(hits > 200, "{name}: only {hits} hits");
             for isa in Best::all() {
-                let together = stage.trace(isa, &rays, 64, flags);
+                let together = stage.trace(isa, &rays, (64, false), flags);
                 let context = format!("{name} rays, flags {flags}, {}", isa.describe().0);
                 for (i, ray) in rays.iter().enumerate() {
                     assert_eq!(together.0[i], alone.0[i], "{context}: hit of ray {i}: {ray:?}");
@@ -138,7 +149,16 @@ fn rays_that_go_together_find_and_count_what_each_does_alone() {
                 // Control: other rays find something else.
                 let mut others = rays.clone();
                 others.iter_mut().for_each(|ray| ray.origin[0] += 0.01 * ray.direction[0].abs().max(1.0));
-                assert!(stage.trace(isa, &others, 64, flags) != alone, "{context}");
+                assert!(stage.trace(isa, &others, (64, false), flags) != alone, "{context}");
+                // In flat bricks visits are others, and not all counted.
+                let flat = stage.trace(isa, &rays, (64, true), flags);
+                for (i, ray) in rays.iter().enumerate() {
+                    assert_eq!(flat.0[i], alone.0[i], "{context}, flat: hit of ray {i}: {ray:?}");
+                    assert_eq!(flat.1[i], alone.1[i], "{context}, flat: surface of ray {i}: {ray:?}");
+                }
+                assert_eq!(flat.3, alone.3, "{context}, flat: uses");
+                assert!(flat.2 < alone.2, "{context}: bricks were flat");
+                assert!(stage.trace(isa, &others, (64, true), flags).0 != alone.0, "{context}, flat");
             }
         }
     }

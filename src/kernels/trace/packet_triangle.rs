@@ -5,7 +5,7 @@
 use super::hidden::is_hidden;
 use super::leaf::BrickRay;
 use super::packet::{Packet, RAYS, turned};
-use crate::kernels::simd::isa::{Isa, inside};
+use crate::kernels::simd::isa::{INSIDE, Isa};
 use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, each};
 use crate::math::exact::{CLAMP_ULPS, TINY, TriangleHit, intersect_triangle};
@@ -30,46 +30,25 @@ impl Packet {
             let sa = shear(turned::<I>(a, self.axis, axes), by);
             let sb = shear(turned::<I>(b, self.axis, axes), by);
             let sc = shear(turned::<I>(c, self.axis, axes), by);
-            let u = sc[0] * sb[1] - sc[1] * sb[0];
-            let v_ = sa[0] * sc[1] - sa[1] * sc[0];
-            let w = sb[0] * sa[1] - sb[1] * sa[0];
-            let (zero, tiny) = (isa.splat(0.0), isa.splat(TINY));
-            let mut alone = (u.abs().less(tiny) | v_.abs().less(tiny) | w.abs().less(tiny)) & lanes;
-            let beside = u.least(v_.least(w)).less(zero) & zero.less(u.most(v_.most(w)));
-            let mut hit = lanes & !beside & !alone;
-            if hit | alone == 0 {
-                continue;
-            }
-            let det = u + v_ + w;
-            hit &= det.less(zero) | zero.less(det);
-            let sum = u * sa[2] + v_ * sb[2] + w * sc[2];
-            let quotient = sum / det;
-            let plain = inside(isa, sum) & inside(isa, det) & inside(isa, quotient);
-            alone |= hit & !plain;
-            hit &= plain;
-            let (t_min, t_max) = (self.t_min.get(isa, v), self.t.get(isa, v));
-            let t = quotient * self.along.get(isa, v);
-            hit &= t_min.less_equal(t);
+            let rays = Rays {
+                along: self.along.get(isa, v),
+                inverse: three!(k => self.inverse[k].get(isa, v)),
+                t_min: self.t_min.get(isa, v),
+                t_max: self.t.get(isa, v),
+            };
+            let met = meet(
+                #[inline(always)]
+                |x| isa.splat(x),
+                [a, b, c],
+                [sa, sb, sc],
+                &rays,
+                lanes,
+            );
+            let Some(Met { hit, mut alone, values }) = met else { continue };
             if hit != 0 {
-                let low = three!(k => a[k].least(b[k].least(c[k])));
-                let high = three!(k => a[k].most(b[k].most(c[k])));
-                let m = three!(k => low[k].abs().most(high[k].abs()));
-                let e = isa.splat(CLAMP_ULPS) * m[0].most(m[1].most(m[2]));
-                let inverse = three!(k => self.inverse[k].get(isa, v));
-                let t0 = three!(k => (low[k] - e) * inverse[k]);
-                let t1 = three!(k => (high[k] + e) * inverse[k]);
-                let near = three!(k => t0[k].least(t1[k]));
-                let far = three!(k => t0[k].most(t1[k]));
-                let n = near[0].most(near[1].most(near[2]));
-                let x = far[0].least(far[1].least(far[2]));
-                hit &= !x.less(t_min);
-                let t = t.least(x).most(n.most(t_min)).abs();
-                hit &= t.less_equal(t_max);
-                if hit != 0 {
-                    hit = self.keep(isa, r, triangle, (v, hit), [t, u, v_, w, det]);
-                    is_nearer |= hit != 0;
-                    self.done |= if any_hit { u64::from(hit) << shift } else { 0 };
-                }
+                let kept = self.keep(isa, r, triangle, (v, hit), values);
+                is_nearer |= kept != 0;
+                self.done |= if any_hit { u64::from(kept) << shift } else { 0 };
             }
             while alone != 0 {
                 let i = shift + alone.trailing_zeros() as usize;
@@ -155,6 +134,77 @@ impl Packet {
     }
 }
 
+/// What the test takes of rays, a lane each.
+pub struct Rays<W> {
+    /// [`crate::math::exact::RayFrame::iz`].
+    pub along: W,
+    /// 1 / direction, by axes in the order of the vertices'.
+    pub inverse: [W; 3],
+    /// Least parameters.
+    pub t_min: W,
+    /// Distances beyond which hits are of no use.
+    pub t_max: W,
+}
+
+/// What it finds.
+pub struct Met<W> {
+    /// Lanes that hit.
+    pub hit: u32,
+    /// Lanes whose numbers leave the range: they are to be tested alone.
+    pub alone: u32,
+    /// Distances, edge values u, v, w and their sums.
+    pub values: [W; 5],
+}
+
+/// [`intersect_triangle`] lane by lane: vertices as seen from the origins, and the same turned and sheared. `None`: no
+/// lane hits.
+#[inline(always)]
+pub fn meet<W: Wide>(
+    splat: impl Fn(f32) -> W,
+    [a, b, c]: [[W; 3]; 3],
+    [sa, sb, sc]: [[W; 3]; 3],
+    rays: &Rays<W>,
+    lanes: u32,
+) -> Option<Met<W>> {
+    let u = sc[0] * sb[1] - sc[1] * sb[0];
+    let v = sa[0] * sc[1] - sa[1] * sc[0];
+    let w = sb[0] * sa[1] - sb[1] * sa[0];
+    let (zero, tiny) = (splat(0.0), splat(TINY));
+    let mut alone = (u.abs().less(tiny) | v.abs().less(tiny) | w.abs().less(tiny)) & lanes;
+    let beside = u.least(v.least(w)).less(zero) & zero.less(u.most(v.most(w)));
+    let mut hit = lanes & !beside & !alone;
+    if hit | alone == 0 {
+        return None;
+    }
+    let det = u + v + w;
+    hit &= det.less(zero) | zero.less(det);
+    let sum = u * sa[2] + v * sb[2] + w * sc[2];
+    let quotient = sum / det;
+    let inside = |x: W| splat(INSIDE[0]).less_equal(x.abs()) & x.abs().less(splat(INSIDE[1]));
+    let plain = inside(sum) & inside(det) & inside(quotient);
+    alone |= hit & !plain;
+    hit &= plain;
+    let t = quotient * rays.along;
+    hit &= rays.t_min.less_equal(t);
+    if hit | alone == 0 {
+        return None;
+    }
+    let low = three!(k => a[k].least(b[k].least(c[k])));
+    let high = three!(k => a[k].most(b[k].most(c[k])));
+    let m = three!(k => low[k].abs().most(high[k].abs()));
+    let e = splat(CLAMP_ULPS) * m[0].most(m[1].most(m[2]));
+    let t0 = three!(k => (low[k] - e) * rays.inverse[k]);
+    let t1 = three!(k => (high[k] + e) * rays.inverse[k]);
+    let near = three!(k => t0[k].least(t1[k]));
+    let far = three!(k => t0[k].most(t1[k]));
+    let n = near[0].most(near[1].most(near[2]));
+    let x = far[0].least(far[1].least(far[2]));
+    hit &= !x.less(rays.t_min);
+    let t = t.least(x).most(n.most(rays.t_min)).abs();
+    hit &= t.less_equal(rays.t_max);
+    Some(Met { hit, alone, values: [t, u, v, w, det] })
+}
+
 /// A vertex as seen from the origins.
 #[inline(always)]
 fn relative<I: Isa>(isa: I, x: Vec3, origin: [I::Wide; 3]) -> [I::Wide; 3] {
@@ -163,6 +213,6 @@ fn relative<I: Isa>(isa: I, x: Vec3, origin: [I::Wide; 3]) -> [I::Wide; 3] {
 
 /// [`crate::math::exact::shear`] of components in their order.
 #[inline(always)]
-fn shear<W: Wide>(p: [W; 3], by: [W; 2]) -> [W; 3] {
+pub fn shear<W: Wide>(p: [W; 3], by: [W; 2]) -> [W; 3] {
     [p[0] - by[0] * p[2], p[1] - by[1] * p[2], p[2]]
 }

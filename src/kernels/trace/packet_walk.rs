@@ -1,17 +1,22 @@
 //! Packets in bricks: what [`super::walk_brick`] does for a ray, for up to 64.
 
+use super::flat_node::{FlatOpen, FlatStack, Sight};
 use super::leaf::BrickRay;
 use super::packet::Packet;
+use super::packet_flat::Sights;
 use super::packet_node::Place;
 use super::scratch::Scratch;
 use super::walk_brick::{Group, STACK_SIZE, Stack, Visits};
 use crate::kernels::bound::{Bound, Tally};
+use crate::kernels::flat::FlatBrick;
 use crate::kernels::layout::{COUNTER_STACK_OVERFLOW, INSTANCE_IDENTITY, NONE};
 use crate::kernels::simd::isa::{Isa, Lanes};
 
 /// Where fewer rays than this go, each goes by itself: testing eight children for one ray costs less than testing the
 /// rays for each child.
 const TOGETHER: u32 = 3;
+/// The same in bricks that are flat, where a ray by itself costs less.
+const FLAT_TOGETHER: u32 = 4;
 
 /// A node's entered children, with the rays that enter each by slot.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,6 +25,8 @@ pub struct PacketGroup {
     pub group: Group,
     /// Who enters each.
     pub rays: [u64; 8],
+    /// No more than the distance at which any ray enters each.
+    pub near: [f32; 8],
 }
 
 /// Groups that are left to be visited.
@@ -33,6 +40,10 @@ pub struct PacketScratch {
     pub bricks: PacketStack,
     /// Groups of the top level.
     pub top: PacketStack,
+    /// What the rays add to the boxes of the brick that they are in.
+    pub sights: Sights,
+    /// Nodes that a ray is to visit by itself.
+    open: FlatStack,
     /// Visits of all rays.
     pub visits: Visits,
 }
@@ -40,7 +51,9 @@ pub struct PacketScratch {
 impl Default for PacketScratch {
     fn default() -> Self {
         let stack = [PacketGroup::default(); STACK_SIZE];
-        Self { packet: Packet::empty(), bricks: stack, top: stack, visits: Visits::default() }
+        let (packet, sights, visits) = (Packet::empty(), Sights::empty(), Visits::default());
+        let open = [FlatOpen::default(); STACK_SIZE];
+        Self { packet, bricks: stack, top: stack, sights, open, visits }
     }
 }
 
@@ -54,7 +67,7 @@ pub fn top_group<I: Isa>(
     (base, rays): (u32, u64),
 ) -> PacketGroup {
     let node = &bound.scene.top8[base as usize];
-    let mut group = PacketGroup { group: Group { base, bits: 0 }, rays: [0; 8] };
+    let mut group = PacketGroup { group: Group { base, bits: 0 }, ..PacketGroup::default() };
     let mut met = packet.open(isa, node, place, rays, &mut group.rays);
     while met != 0 {
         group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ packet.flip);
@@ -66,12 +79,12 @@ pub fn top_group<I: Isa>(
 /// Takes the nearest child of the group on top of the stack: its node, its slot and the rays that enter it. The group
 /// is taken down with its last child.
 #[inline(always)]
-pub fn take(stack: &mut PacketStack, depth: &mut usize, flip: u32) -> (Group, u32, u64) {
+pub fn take(stack: &mut PacketStack, depth: &mut usize, flip: u32, t_max: f32) -> (Group, u32, u64) {
     let top = &mut stack[*depth - 1];
     let group = top.group;
     let (slot, rest) = group.nearest_child(flip);
     top.group = rest;
-    let rays = top.rays[(slot & 7) as usize];
+    let rays = if top.near[(slot & 7) as usize] <= t_max { top.rays[(slot & 7) as usize] } else { 0 };
     if !rest.has_children() {
         *depth -= 1;
     }
@@ -116,6 +129,13 @@ impl PacketScratch {
                 let i = left.trailing_zeros() as usize;
                 left &= left - 1;
                 r.enter_leaf(bound.scene, &self.packet.ray(i), leaf);
+                if let Some(flat) = r.brick.flat
+                    && bound.is_used(leaf)
+                {
+                    let sight = Sight::new(&r.ray, flat, r.offset_high, r.offset_low);
+                    self.walk_flat(isa, (&r, &sight), flat, tally, (i, 0), any_hit);
+                    continue;
+                }
                 self.walk_alone(isa, bound, &r, stack, tally, (i, 0), any_hit);
             }
             return;
@@ -123,24 +143,38 @@ impl PacketScratch {
         r.enter_leaf(bound.scene, &first, leaf);
         let place = Place::new(r.offset_high, r.offset_low, 0.0);
         let flip = self.packet.flip;
-        self.bricks[0] = PacketGroup { group: Group::root(flip), rays: [rays; 8] };
+        // The packed root says whether a brick is of use.
+        let first_flat = u32::from(!bound.is_used(leaf));
+        if let Some(flat) = r.brick.flat {
+            self.sights.set(isa, &self.packet, flat, (r.offset_high, r.offset_low), rays);
+        }
+        self.bricks[0] = PacketGroup { group: Group::root(flip), rays: [rays; 8], near: [0.0; 8] };
         let mut depth = 1;
         while depth > 0 {
-            let (group, slot, rays) = take(&mut self.bricks, &mut depth, flip);
+            let (group, slot, rays) = take(&mut self.bricks, &mut depth, flip, self.packet.bounds.t[1]);
             let index = group.child_index(slot);
             let rays = rays & !self.packet.done;
-            if rays.count_ones() < TOGETHER {
+            let flat = r.brick.flat.filter(|_| index >= first_flat);
+            if rays.count_ones() < if flat.is_some() { FLAT_TOGETHER } else { TOGETHER } {
                 let mut left = rays;
                 while left != 0 {
                     let i = left.trailing_zeros() as usize;
                     left &= left - 1;
                     r.ray = self.packet.ray(i);
+                    if let Some(flat) = flat {
+                        let sight = self.sights.of(i, r.ray.frame.inv);
+                        self.walk_flat(isa, (&r, &sight), flat, tally, (i, index), any_hit);
+                        continue;
+                    }
                     r.lanes = Lanes::new(&r.ray, r.offset_high, r.offset_low);
                     self.walk_alone(isa, bound, &r, stack, tally, (i, index), any_hit);
                 }
                 continue;
             }
-            let children = self.open_node(isa, bound, &r, &place, (index, rays), any_hit);
+            let children = match flat {
+                Some(flat) => self.open_flat(isa, &r, flat, (index, rays), any_hit),
+                _ => self.open_node(isa, bound, &r, &place, (index, rays), any_hit),
+            };
             if !put(&mut self.bricks, &mut depth, children, tally) {
                 break;
             }
@@ -187,17 +221,54 @@ impl PacketScratch {
                 }
             }
         }
-        let mut is_nearer = false;
+        self.test_triangles(isa, r, Group { base: node.triangle_base, bits: triangles }, &testing, any_hit);
+        PacketGroup { group: children, rays: entered, near: [0.0; 8] }
+    }
+
+    /// Tests a group of triangles, each with rays of its own.
+    #[inline(always)]
+    fn test_triangles<I: Isa>(&mut self, isa: I, r: &BrickRay, group: Group, testing: &[u64; 32], any_hit: bool) {
+        let (mut triangles, mut is_nearer) = (group.bits, false);
         while triangles != 0 {
             let bit = triangles.trailing_zeros();
             triangles &= triangles - 1;
             let rays = testing[bit as usize] & !self.packet.done;
-            is_nearer |= self.packet.test_triangle(isa, r, node.triangle_base + bit, rays, any_hit);
+            is_nearer |= self.packet.test_triangle(isa, r, group.base + bit, rays, any_hit);
         }
         if is_nearer {
             self.packet.shorten(isa);
         }
-        PacketGroup { group: children, rays: entered }
+    }
+
+    /// [`PacketScratch::open_node`] of a brick that is flat.
+    #[inline(always)]
+    fn open_flat<I: Isa>(
+        &mut self,
+        isa: I,
+        r: &BrickRay,
+        flat: &FlatBrick,
+        (index, rays): (u32, u64),
+        any_hit: bool,
+    ) -> PacketGroup {
+        let node = &flat.nodes[index as usize];
+        let (mut entered, mut near) = ([0; 8], [0.0; 8]);
+        let met = self.sights.open(isa, &self.packet, node, rays, (&mut entered, &mut near));
+        let opened = node.opened(met, self.packet.flip);
+        if opened.triangles.bits != 0 {
+            let mut testing = [0; 32];
+            let mut leaves = met & !node.inner_mask;
+            while leaves != 0 {
+                let i = leaves.trailing_zeros() as usize % 8;
+                leaves &= leaves - 1;
+                let mut own = node.triangles[i];
+                while own != 0 {
+                    testing[own.trailing_zeros() as usize] = entered[i];
+                    own &= own - 1;
+                }
+            }
+            self.test_triangles(isa, r, opened.triangles, &testing, any_hit);
+        }
+        PacketGroup { group: opened.children, rays: entered, near }
     }
 
     /// Has ray `i`, which `r` is, visit a node and what is below it.
@@ -239,6 +310,42 @@ impl PacketScratch {
         }
         if best.leaf != NONE {
             packet.set_best(i, &best);
+        }
+    }
+
+    /// The same in a brick that is flat.
+    #[inline(always)]
+    fn walk_flat<I: Isa>(
+        &mut self,
+        isa: I,
+        (r, sight): (&BrickRay, &Sight),
+        flat: &FlatBrick,
+        tally: &mut Tally,
+        (i, index): (usize, u32),
+        any_hit: bool,
+    ) {
+        let (mut best, flip) = (self.packet.best(i), r.ray.flip);
+        best.leaf = NONE;
+        let (mut next, mut depth) = (Some(index), 0);
+        while let Some(index) = next {
+            if depth == STACK_SIZE {
+                tally.add(COUNTER_STACK_OVERFLOW, 1);
+                break;
+            }
+            let triangles =
+                sight.open(isa, &flat.nodes[index as usize], flip, (r.ray.t_min, best.t), &mut self.open[depth]);
+            if triangles.bits != 0 {
+                r.test_flat(isa, flat, &mut best, triangles, any_hit);
+                if any_hit && best.leaf != NONE {
+                    self.packet.done |= 1 << i;
+                    break;
+                }
+            }
+            depth += 1;
+            next = FlatOpen::take(&mut self.open, &mut depth, flip, best.t);
+        }
+        if best.leaf != NONE {
+            self.packet.set_best(i, &best);
         }
     }
 

@@ -77,7 +77,7 @@ pub trait Isa: Copy + Send + Sync {
 }
 
 /// Numbers for which [`crate::math::exact::is_inside`] holds lie in these bounds, the upper one excluded.
-const INSIDE: [f32; 2] = [f32::from_bits(2 << 23), f32::from_bits(254 << 23)];
+pub const INSIDE: [f32; 2] = [f32::from_bits(2 << 23), f32::from_bits(254 << 23)];
 
 /// [`crate::math::exact::is_inside`].
 #[inline(always)]

@@ -6,14 +6,14 @@ use crate::kernels::trace::node::{FramedRay, NodeHits, UNIT};
 use bricks::Node;
 use std::arch::x86_64::*;
 
-/// AVX2, of x86-64.
+/// AVX2 and FMA, of x86-64: all processors that have the first but for one family have the second.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
 
 impl Avx2 {
     /// If the processor has it.
     pub fn detect() -> Option<Self> {
-        is_x86_feature_detected!("avx2").then_some(Self(()))
+        (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(Self(()))
     }
 }
 
@@ -183,13 +183,13 @@ fn open(ray: &FramedRay, lanes: &Lanes, node: &Node, t_max: f32) -> u32 {
 }
 
 /// Does `work`, compiled for AVX2.
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,fma")]
 pub(super) fn run_avx2<W: Work>(isa: Avx2, work: W) -> W::Out {
     work.run(isa)
 }
 
 /// Does `work`, compiled for AVX-512.
-#[target_feature(enable = "avx2,avx512f,avx512dq")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512dq")]
 pub(super) fn run_avx512<W: Work>(isa: Avx512, work: W) -> W::Out {
     work.run(isa)
 }

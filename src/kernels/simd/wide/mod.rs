@@ -1,5 +1,5 @@
-//! Numbers of several rays at once. Operations are those of f32, lane by lane, none of them fused; comparisons give a
-//! bit a lane.
+//! Numbers of several rays at once. Operations are those of f32, lane by lane, none of them fused but where that is
+//! asked for; comparisons give a bit a lane.
 
 use crate::math::exact;
 use std::ops::{Add, BitAnd, BitXor, Div, Mul, Sub};
@@ -23,6 +23,9 @@ pub trait Wide:
 
     /// [`exact::least`].
     fn least(self, other: Self) -> Self;
+
+    /// self * by + plus, of which the product is rounded or not: for what bounds, and does not show.
+    fn times_plus(self, by: Self, plus: Self) -> Self;
 
     /// Magnitudes.
     fn abs(self) -> Self;
@@ -128,6 +131,11 @@ impl Wide for Portable {
     }
 
     #[inline(always)]
+    fn times_plus(self, by: Self, plus: Self) -> Self {
+        self * by + plus
+    }
+
+    #[inline(always)]
     fn abs(self) -> Self {
         Self(self.0.map(f32::abs))
     }
@@ -178,7 +186,7 @@ impl Wide for Portable {
 macro_rules! over_intrinsics {
     ($name:ident, $vector:ty, $lanes:literal, $add:ident, $sub:ident, $mul:ident, $div:ident, $max:ident, $min:ident,
      $sqrt:ident, $set:ident, $load:ident, $store:ident, $abs:ident, $and:ident, $xor:ident, $less:ident,
-     $less_equal:ident, $same_bits:ident, $less_bits:ident, $add_bits:ident, $blend:ident) => {
+     $less_equal:ident, $same_bits:ident, $less_bits:ident, $add_bits:ident, $blend:ident, $fused:ident) => {
         /// Numbers in registers.
         #[derive(Clone, Copy)]
         pub struct $name($vector);
@@ -218,6 +226,7 @@ macro_rules! over_intrinsics {
 
             over_intrinsics!(numbers most $max other);
             over_intrinsics!(numbers least $min other);
+            over_intrinsics!(numbers times_plus $fused by plus);
             over_intrinsics!(numbers abs $abs);
             over_intrinsics!(numbers sqrt $sqrt);
             over_intrinsics!(numbers add_bits $add_bits other);
@@ -248,11 +257,11 @@ macro_rules! over_intrinsics {
             over_intrinsics!(numbers $method $intrinsic other);
         }
     };
-    (numbers $method:ident $intrinsic:ident $($other:ident)?) => {
+    (numbers $method:ident $intrinsic:ident $($other:ident)*) => {
         #[inline(always)]
-        fn $method(self $(, $other: Self)?) -> Self {
+        fn $method(self $(, $other: Self)*) -> Self {
             // SAFETY: a value of the type exists only where the processor has the instructions.
-            Self(unsafe { $intrinsic(self.0 $(, $other.0)?) })
+            Self(unsafe { $intrinsic(self.0 $(, $other.0)*) })
         }
     };
     (bits $method:ident $intrinsic:ident) => {

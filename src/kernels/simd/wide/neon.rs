@@ -90,6 +90,12 @@ by_comparison!(words less_bits, vcltq_u32);
 
 #[inline]
 #[target_feature(enable = "neon")]
+fn fused(a: float32x4x2_t, by: float32x4x2_t, plus: float32x4x2_t) -> float32x4x2_t {
+    float32x4x2_t(vfmaq_f32(plus.0, a.0, by.0), vfmaq_f32(plus.1, a.1, by.1))
+}
+
+#[inline]
+#[target_feature(enable = "neon")]
 fn abs(x: float32x4x2_t) -> float32x4x2_t {
     float32x4x2_t(vabsq_f32(x.0), vabsq_f32(x.1))
 }
@@ -170,5 +176,6 @@ over_intrinsics!(
     same_bits,
     less_bits,
     add_bits,
-    blend
+    blend,
+    fused
 );

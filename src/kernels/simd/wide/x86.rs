@@ -89,7 +89,8 @@ over_intrinsics!(
     same_bits,
     less_bits,
     add_bits,
-    blend
+    blend,
+    _mm256_fmadd_ps
 );
 
 #[inline]
@@ -156,5 +157,6 @@ over_intrinsics!(
     same_bits_512,
     less_bits_512,
     add_bits_512,
-    blend_512
+    blend_512,
+    _mm512_fmadd_ps
 );

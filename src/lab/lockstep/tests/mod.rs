@@ -204,7 +204,8 @@ fn lockstep(
     findings: &Arc<Mutex<Findings>>,
 ) -> Lockstep {
     let extent = Extent { height, ..EXTENT };
-    let setup = Setup { extent, threshold, count: true, opaque: false, hides: hides > 0, keep: Keep::default() };
+    let setup =
+        Setup { extent, threshold, count: true, opaque: false, hides: hides > 0, flat_bytes: 0, keep: Keep::default() };
     let host = || HostCache::new(1 << 20);
     let on_gpu = GpuExecutor::with_kernels(
         device.gpu.clone(),

@@ -1,0 +1,154 @@
+//! One ray against the children of a node of a brick that is flat ([`crate::kernels::flat`]).
+
+use super::node::{FramedRay, UNIT};
+use super::walk_brick::{Group, OpenedNode, STACK_SIZE};
+use crate::kernels::flat::{FlatBrick, FlatNode};
+use crate::kernels::simd::isa::Isa;
+use crate::kernels::simd::wide::{Wide, three};
+use crate::kernels::vector::{Vec3, each, most3};
+
+/// What a ray adds to all boxes of a brick: distances are bound * `inverse` + `near`, and the same with `far`.
+#[derive(Clone, Copy, Default)]
+pub struct Sight {
+    /// Of the direction.
+    pub inverse: Vec3,
+    /// Of the padded bounds that are near.
+    pub near: Vec3,
+    /// Of the others.
+    pub far: Vec3,
+    /// Which bounds are near by axis: 0 lower, 1 upper.
+    pub side: [usize; 3],
+}
+
+impl Sight {
+    /// Of a ray in a frame in which the brick lies at an offset. The padding is that of [`super::node::NodeFrame`], for
+    /// the farthest of the brick's bounds.
+    #[inline(always)]
+    pub fn new(ray: &FramedRay, brick: &FlatBrick, offset_high: Vec3, offset_low: Vec3) -> Self {
+        let at = each(|k| offset_high[k] + offset_low[k]);
+        let w = each(|k| at[k] - ray.origin[k]);
+        let m = most3(each(|k| w[k].abs() + brick.extent[k]));
+        let delta =
+            each(|k| 64.0 * UNIT * m + 4.0 * UNIT * (at[k].abs() + brick.extent[k]) + 2.0 * UNIT * offset_low[k].abs());
+        let inverse = ray.frame.inv;
+        let side = inverse.map(|i| usize::from(i < 0.0));
+        let signed = each(|k| if side[k] != 0 { -delta[k] } else { delta[k] });
+        Self {
+            inverse,
+            near: each(|k| (w[k] - signed[k]) * inverse[k]),
+            far: each(|k| (w[k] + signed[k]) * inverse[k]),
+            side,
+        }
+    }
+
+    /// Opens a node between `t_min` and `t_max`: what the ray enters of its children goes to `open`, what of its
+    /// triangles it may meet comes back.
+    #[inline(always)]
+    pub fn open<I: Isa>(
+        &self,
+        isa: I,
+        node: &FlatNode,
+        flip: u32,
+        (t_min, t_max): (f32, f32),
+        open: &mut FlatOpen,
+    ) -> Group {
+        let inverse = three!(k => isa.eight(self.inverse[k]));
+        let near = three!(k => {
+            isa.load_eight(&node.bounds[self.side[k]][k]).times_plus(inverse[k], isa.eight(self.near[k]))
+        });
+        let far = three!(k => {
+            isa.load_eight(&node.bounds[1 - self.side[k]][k]).times_plus(inverse[k], isa.eight(self.far[k]))
+        });
+        let near = near[0].most(near[1]).most(near[2].most(isa.eight(t_min)));
+        let far = far[0].least(far[1]).least(far[2].least(isa.eight(t_max)));
+        // Not pruned at equality: a hit at equal distance with a lower id must be found.
+        let OpenedNode { children, triangles } = node.opened(near.less_equal(far), flip);
+        open.group = children;
+        near.store(&mut open.near);
+        triangles
+    }
+}
+
+/// Nodes that a ray is to visit.
+pub type FlatStack = [FlatOpen; STACK_SIZE];
+
+/// A node's entered inner children, still to be visited.
+#[derive(Clone, Copy, Default)]
+#[repr(C, align(32))]
+pub struct FlatOpen {
+    /// No more than the distance at which the ray enters each.
+    pub near: [f32; 8],
+    /// Those.
+    pub group: Group,
+}
+
+impl FlatOpen {
+    /// Takes the next child of the topmost of `depth` nodes: the nearest that is entered up to `t_max`.
+    #[inline(always)]
+    pub fn take(stack: &mut FlatStack, depth: &mut usize, flip: u32, t_max: f32) -> Option<u32> {
+        while *depth > 0 {
+            let top = &mut stack[*depth - 1];
+            while top.group.has_children() {
+                let group = top.group;
+                let (slot, rest) = group.nearest_child(flip);
+                top.group = rest;
+                if top.near[(slot & 7) as usize] <= t_max {
+                    *depth -= usize::from(!rest.has_children());
+                    return Some(group.child_index(slot));
+                }
+            }
+            *depth -= 1;
+        }
+        None
+    }
+}
+
+/// The bits of a byte by priority: bit i at 7 - (i ^ `flip`).
+#[inline(always)]
+fn by_priority(bits: u32, flip: u32) -> u32 {
+    // As bits of a byte are reversed, but that each of the steps is made or not.
+    let step = |x: u32, by: u32, low: u32| if flip & by == 0 { (x & low) << by | x >> by & low } else { x };
+    step(step(step(bits, 1, 0x55), 2, 0x33), 4, 0x0f)
+}
+
+impl FlatNode {
+    /// What is met of it where children are entered, a bit each.
+    #[inline(always)]
+    pub fn opened(&self, entered: u32, flip: u32) -> OpenedNode {
+        let inner = entered & self.inner_mask;
+        let mut leaves = entered & self.present & !self.inner_mask;
+        let mut triangles = 0;
+        while leaves != 0 {
+            triangles |= self.triangles[leaves.trailing_zeros() as usize % 8];
+            leaves &= leaves - 1;
+        }
+        OpenedNode {
+            children: Group { base: self.child_base, bits: by_priority(inner, flip) << 24 | self.inner_mask },
+            triangles: Group { base: self.triangle_base, bits: triangles },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::probe;
+    use crate::kernels::trace::node::traversal_mask;
+
+    #[test]
+    fn children_have_the_priorities_of_packed_nodes() {
+        let file = probe::scene().unwrap();
+        let mut masks = std::collections::BTreeSet::new();
+        for brick in &file.resident().bricks {
+            let flat = FlatBrick::new(&[brick.root], std::iter::empty());
+            for (entered, flip) in (0..256).flat_map(|entered| (0..8).map(move |flip| (entered, flip))) {
+                let OpenedNode { children, triangles } = flat.nodes[0].opened(entered, flip);
+                let packed = traversal_mask(entered, &brick.root, flip);
+                assert_eq!(children.bits & 0xff00_0000 | triangles.bits, packed, "{entered:#b} {flip}");
+                assert_eq!(children.bits & 0xff, u32::from(brick.root.inner_mask));
+                masks.insert(packed);
+            }
+        }
+        assert!(masks.len() > 100, "only {} masks", masks.len());
+    }
+}

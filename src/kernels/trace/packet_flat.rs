@@ -1,0 +1,147 @@
+//! The rays of a packet against the children of a node of a brick that is flat: [`super::packet_node`], but that what
+//! rays add to boxes is made once a brick.
+
+use super::flat_node::Sight;
+use super::node::UNIT;
+use super::packet::{Column, Packet, RAYS};
+use crate::kernels::flat::{FlatBrick, FlatNode};
+use crate::kernels::simd::isa::Isa;
+use crate::kernels::simd::wide::{Wide, three};
+use crate::kernels::vector::{Vec3, each, most, most3};
+
+/// [`Sight`] of all rays of a packet, and bounds of it.
+pub struct Sights {
+    near: [Column; 3],
+    far: [Column; 3],
+    /// What the ray that meets them first adds to bounds that are near, and what the one that leaves them last does to
+    /// the others, before both are divided by directions.
+    first: Vec3,
+    last: Vec3,
+    side: [usize; 3],
+}
+
+impl Sights {
+    /// Of no brick.
+    pub fn empty() -> Self {
+        let none = [Column([0.0; RAYS]); 3];
+        Self { near: none, far: none, first: [0.0; 3], last: [0.0; 3], side: [0; 3] }
+    }
+
+    /// In a brick at an offset; of other rays than `rays`, maybe nothing.
+    #[inline(always)]
+    pub fn set<I: Isa>(
+        &mut self,
+        isa: I,
+        packet: &Packet,
+        brick: &FlatBrick,
+        (offset_high, offset_low): (Vec3, Vec3),
+        rays: u64,
+    ) {
+        let bounds = &packet.bounds;
+        let at = each(|k| offset_high[k] + offset_low[k]);
+        let pad = each(|k| 4.0 * UNIT * (at[k].abs() + brick.extent[k]) + 2.0 * UNIT * offset_low[k].abs());
+        self.side = [2, 1, 0].map(|bit| (packet.flip >> bit & 1) as usize);
+        // As [`Sight::new`] says of every ray; each operation is monotonic in f32, too.
+        let (low, high) = (each(|k| at[k] - bounds.origin[1][k]), each(|k| at[k] - bounds.origin[0][k]));
+        let m = most3(each(|k| most(low[k].abs(), high[k].abs()) + brick.extent[k]));
+        for k in 0..3 {
+            let delta = 64.0 * UNIT * m + pad[k];
+            let ends = [low[k] - delta, high[k] + delta];
+            (self.first[k], self.last[k]) = (ends[self.side[k]], ends[1 - self.side[k]]);
+        }
+        for v in 0..packet.vectors::<I>() {
+            if (rays >> (v * I::Wide::LANES)) & (u64::MAX >> (RAYS - I::Wide::LANES)) == 0 {
+                continue;
+            }
+            let inverse = three!(k => packet.inverse[k].get(isa, v));
+            let w = three!(k => isa.splat(at[k]) - packet.origin[k].get(isa, v));
+            let size = three!(k => w[k].abs() + isa.splat(brick.extent[k]));
+            let m = isa.splat(64.0 * UNIT) * size[0].most(size[1].most(size[2]));
+            let delta = three!(k => m + isa.splat(pad[k]));
+            for k in 0..3 {
+                let low = (w[k] - delta[k]) * inverse[k];
+                let high = (w[k] + delta[k]) * inverse[k];
+                let is_negative = self.side[k] != 0;
+                self.near[k].set(v, if is_negative { high } else { low });
+                self.far[k].set(v, if is_negative { low } else { high });
+            }
+        }
+    }
+
+    /// That of ray `i`, whose inverse direction is given.
+    #[inline(always)]
+    pub fn of(&self, i: usize, inverse: Vec3) -> Sight {
+        let at = |columns: &[Column; 3]| three!(k => columns[k].0[i % RAYS]);
+        Sight { inverse, near: at(&self.near), far: at(&self.far), side: self.side }
+    }
+
+    /// Which of `rays` enter each child of `node`, written to `entered` for the children of the mask that comes back,
+    /// and no more than the least distance of any to `least`; no ray enters another child that exists. `entered` holds
+    /// zeros before.
+    #[inline(always)]
+    pub fn open<I: Isa>(
+        &self,
+        isa: I,
+        packet: &Packet,
+        node: &FlatNode,
+        rays: u64,
+        (entered, least): (&mut [u64; 8], &mut [f32; 8]),
+    ) -> u32 {
+        let (bounds, side) = (&packet.bounds, self.side);
+        let near = three!(k => isa.load_eight(&node.bounds[side[k]][k]) + isa.eight(self.first[k]));
+        let far = three!(k => isa.load_eight(&node.bounds[1 - side[k]][k]) + isa.eight(self.last[k]));
+        let (slow, fast) = (&bounds.inverse[0], &bounds.inverse[1]);
+        let (near_slow, near_fast) =
+            (three!(k => near[k] * isa.eight(slow[k])), three!(k => near[k] * isa.eight(fast[k])));
+        let (far_slow, far_fast) = (three!(k => far[k] * isa.eight(slow[k])), three!(k => far[k] * isa.eight(fast[k])));
+        let tn = three!(k => near_slow[k].least(near_fast[k]));
+        let tf = three!(k => far_slow[k].most(far_fast[k]));
+        let tn = tn[0].most(tn[1]).most(tn[2].most(isa.eight(bounds.t_min[0])));
+        let tf = tf[0].least(tf[1]).least(tf[2].least(isa.eight(bounds.t[1])));
+        let some = tn.less_equal(tf) & node.present;
+        if some == 0 {
+            return 0;
+        }
+        tn.store(least);
+        // Those that every ray enters. Rays from several points have planes of their own.
+        let mut every = 0;
+        if bounds.is_point {
+            let tn = three!(k => near_slow[k].most(near_fast[k]));
+            let tf = three!(k => far_slow[k].least(far_fast[k]));
+            let tn = tn[0].most(tn[1]).most(tn[2].most(isa.eight(bounds.t_min[1])));
+            let tf = tf[0].least(tf[1]).least(tf[2].least(isa.eight(bounds.t[0])));
+            every = tn.less_equal(tf) & some;
+        }
+        let unsure = some & !every;
+        let mut met = every;
+        while every != 0 {
+            entered[every.trailing_zeros() as usize % 8] = rays;
+            every &= every - 1;
+        }
+        if unsure == 0 {
+            return met;
+        }
+        for v in 0..packet.vectors::<I>() {
+            let shift = v * I::Wide::LANES;
+            let lanes = (rays >> shift) & (u64::MAX >> (RAYS - I::Wide::LANES));
+            if lanes == 0 {
+                continue;
+            }
+            let inverse = three!(k => packet.inverse[k].get(isa, v));
+            let (near, far) = (three!(k => self.near[k].get(isa, v)), three!(k => self.far[k].get(isa, v)));
+            let (t_min, t_max) = (packet.t_min.get(isa, v), packet.t.get(isa, v));
+            let mut left = unsure;
+            while left != 0 {
+                let i = left.trailing_zeros() as usize % 8;
+                left &= left - 1;
+                let n = three!(k => isa.splat(node.bounds[side[k]][k][i]).times_plus(inverse[k], near[k]));
+                let f = three!(k => isa.splat(node.bounds[1 - side[k]][k][i]).times_plus(inverse[k], far[k]));
+                let (tn, tf) = (n[0].most(n[1]).most(n[2].most(t_min)), f[0].least(f[1]).least(f[2].least(t_max)));
+                let bits = u64::from(tn.less_equal(tf)) & lanes;
+                entered[i] |= bits << shift;
+                met |= u32::from(bits != 0) << i;
+            }
+        }
+        met
+    }
+}
