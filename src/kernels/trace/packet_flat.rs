@@ -11,6 +11,8 @@ use crate::kernels::vector::{Vec3, each, most, most3};
 
 /// [`Sight`] of all rays of a packet, and bounds of it.
 pub struct Sights {
+    /// Whether those of single rays have been made, which not every brick needs.
+    is_made: bool,
     near: [Column; 3],
     far: [Column; 3],
     /// What the ray that meets them first adds to bounds that are near, and what the one that leaves them last does to
@@ -18,49 +20,50 @@ pub struct Sights {
     first: Vec3,
     last: Vec3,
     side: [usize; 3],
+    /// Where the brick's origin lies, and the part of the padding that depends on no ray.
+    at: Vec3,
+    pad: Vec3,
 }
 
 impl Sights {
     /// Of no brick.
     pub fn empty() -> Self {
-        let none = [Column([0.0; RAYS]); 3];
-        Self { near: none, far: none, first: [0.0; 3], last: [0.0; 3], side: [0; 3] }
+        let (none, zero) = ([Column([0.0; RAYS]); 3], [0.0; 3]);
+        Self { is_made: false, near: none, far: none, first: zero, last: zero, side: [0; 3], at: zero, pad: zero }
     }
 
-    /// In a brick at an offset; of other rays than `rays`, maybe nothing.
+    /// Begins with a brick at an offset. As [`Sight::new`] says of every ray; each operation is monotonic in f32, too.
     #[inline(always)]
-    pub fn set<I: Isa>(
-        &mut self,
-        isa: I,
-        packet: &Packet,
-        brick: &FlatBrick,
-        (offset_high, offset_low): (Vec3, Vec3),
-        rays: u64,
-    ) {
+    pub fn begin(&mut self, packet: &Packet, brick: &FlatBrick, (offset_high, offset_low): (Vec3, Vec3)) {
         let bounds = &packet.bounds;
         let at = each(|k| offset_high[k] + offset_low[k]);
         let pad = each(|k| 4.0 * UNIT * (at[k].abs() + brick.extent[k]) + 2.0 * UNIT * offset_low[k].abs());
-        self.side = [2, 1, 0].map(|bit| (packet.flip >> bit & 1) as usize);
-        // As [`Sight::new`] says of every ray; each operation is monotonic in f32, too.
         let (low, high) = (each(|k| at[k] - bounds.origin[1][k]), each(|k| at[k] - bounds.origin[0][k]));
         let m = most3(each(|k| most(low[k].abs(), high[k].abs()) + brick.extent[k]));
+        let side = [2, 1, 0].map(|bit| (packet.flip >> bit & 1) as usize);
         for k in 0..3 {
             let delta = 64.0 * UNIT * m + pad[k];
             let ends = [low[k] - delta, high[k] + delta];
-            (self.first[k], self.last[k]) = (ends[self.side[k]], ends[1 - self.side[k]]);
+            (self.first[k], self.last[k]) = (ends[side[k]], ends[1 - side[k]]);
+        }
+        (self.is_made, self.side, self.at, self.pad) = (false, side, at, pad);
+    }
+
+    /// Makes those of single rays, unless they have been made.
+    #[inline(always)]
+    pub fn make<I: Isa>(&mut self, isa: I, packet: &Packet, brick: &FlatBrick) {
+        if std::mem::replace(&mut self.is_made, true) {
+            return;
         }
         for v in 0..packet.vectors::<I>() {
-            if (rays >> (v * I::Wide::LANES)) & (u64::MAX >> (RAYS - I::Wide::LANES)) == 0 {
-                continue;
-            }
             let inverse = three!(k => packet.inverse[k].get(isa, v));
-            let w = three!(k => isa.splat(at[k]) - packet.origin[k].get(isa, v));
+            let w = three!(k => isa.splat(self.at[k]) - packet.origin[k].get(isa, v));
             let size = three!(k => w[k].abs() + isa.splat(brick.extent[k]));
             let m = isa.splat(64.0 * UNIT) * size[0].most(size[1].most(size[2]));
-            let delta = three!(k => m + isa.splat(pad[k]));
             for k in 0..3 {
-                let low = (w[k] - delta[k]) * inverse[k];
-                let high = (w[k] + delta[k]) * inverse[k];
+                let delta = m + isa.splat(self.pad[k]);
+                let low = (w[k] - delta) * inverse[k];
+                let high = (w[k] + delta) * inverse[k];
                 let is_negative = self.side[k] != 0;
                 self.near[k].set(v, if is_negative { high } else { low });
                 self.far[k].set(v, if is_negative { low } else { high });
@@ -68,7 +71,7 @@ impl Sights {
         }
     }
 
-    /// That of ray `i`, whose inverse direction is given.
+    /// That of ray `i`, whose inverse direction is given, once they have been made.
     #[inline(always)]
     pub fn of(&self, i: usize, inverse: Vec3) -> Sight {
         let at = |columns: &[Column; 3]| three!(k => columns[k].0[i % RAYS]);
@@ -80,10 +83,10 @@ impl Sights {
     /// zeros before.
     #[inline(always)]
     pub fn open<I: Isa>(
-        &self,
+        &mut self,
         isa: I,
         packet: &Packet,
-        node: &FlatNode,
+        (brick, node): (&FlatBrick, &FlatNode),
         rays: u64,
         (entered, least): (&mut [u64; 8], &mut [f32; 8]),
     ) -> u32 {
@@ -121,6 +124,7 @@ impl Sights {
         if unsure == 0 {
             return met;
         }
+        self.make(isa, packet, brick);
         for v in 0..packet.vectors::<I>() {
             let shift = v * I::Wide::LANES;
             let lanes = (rays >> shift) & (u64::MAX >> (RAYS - I::Wide::LANES));

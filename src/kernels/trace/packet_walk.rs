@@ -146,7 +146,7 @@ impl PacketScratch {
         // The packed root says whether a brick is of use.
         let first_flat = u32::from(!bound.is_used(leaf));
         if let Some(flat) = r.brick.flat {
-            self.sights.set(isa, &self.packet, flat, (r.offset_high, r.offset_low), rays);
+            self.sights.begin(&self.packet, flat, (r.offset_high, r.offset_low));
         }
         self.bricks[0] = PacketGroup { group: Group::root(flip), rays: [rays; 8], near: [0.0; 8] };
         let mut depth = 1;
@@ -162,6 +162,7 @@ impl PacketScratch {
                     left &= left - 1;
                     r.ray = self.packet.ray(i);
                     if let Some(flat) = flat {
+                        self.sights.make(isa, &self.packet, flat);
                         let sight = self.sights.of(i, r.ray.frame.inv);
                         self.walk_flat(isa, (&r, &sight), flat, tally, (i, index), any_hit);
                         continue;
@@ -252,7 +253,7 @@ impl PacketScratch {
     ) -> PacketGroup {
         let node = &flat.nodes[index as usize];
         let (mut entered, mut near) = ([0; 8], [0.0; 8]);
-        let met = self.sights.open(isa, &self.packet, node, rays, (&mut entered, &mut near));
+        let met = self.sights.open(isa, &self.packet, (flat, node), rays, (&mut entered, &mut near));
         let opened = node.opened(met, self.packet.flip);
         if opened.triangles.bits != 0 {
             let mut testing = [0; 32];

@@ -163,7 +163,7 @@ const PACKET_BLOCK: usize = 64;
 /// Rays of such a block.
 const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
 /// Bands that a thread has at least, if they can be so low.
-const BANDS: usize = 4;
+const BANDS: usize = 8;
 /// Steps of a direction's components along x and y within its octant, a power of two, by which rays are sorted.
 const STEPS: usize = 4;
 /// Cells of directions: octants by steps.
