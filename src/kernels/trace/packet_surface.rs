@@ -9,7 +9,6 @@ use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, Surface};
 use crate::kernels::simd::isa::{Isa, inside};
 use crate::kernels::simd::wide::{Wide, three};
-use crate::kernels::vector::Vec3;
 use crate::math::exact::{LEAST_COORDINATE, LEAST_SHEAR, OFFSET_ULPS, THIRD};
 
 /// Most lanes of a vector.
@@ -18,15 +17,8 @@ const MOST: usize = 16;
 /// A number a lane.
 type Lane = [f32; MOST];
 
-/// What is known of the hits of a vector.
-#[derive(Default)]
-struct Hits {
-    /// Vertices a, b, c, by axis.
-    vertices: [[Lane; 3]; 3],
-    /// Leaf and number of the triangle of the last lane, and its vertices.
-    which: [u32; 2],
-    last: [Vec3; 3],
-}
+/// What is known of the hits of a vector: vertices a, b, c, by axis.
+type Corners<W> = [[W; 3]; 3];
 
 /// What follows from it.
 #[derive(Default)]
@@ -94,10 +86,7 @@ fn diffprod<I: Isa>(isa: I, a: I::Wide, b: I::Wide, c: I::Wide, d: I::Wide) -> (
 
 /// [`crate::math::exact::surface_point`], and the barycentrics. Returns the lanes that are right.
 #[inline(always)]
-fn points<I: Isa>(isa: I, packet: &Packet, number: usize, hits: &Hits, out: &mut Points) -> u32 {
-    let a = three!(k => isa.load(&hits.vertices[0][k]));
-    let b = three!(k => isa.load(&hits.vertices[1][k]));
-    let c = three!(k => isa.load(&hits.vertices[2][k]));
+fn points<I: Isa>(isa: I, packet: &Packet, number: usize, [a, b, c]: Corners<I::Wide>, out: &mut Points) -> u32 {
     let d = three!(k => packet.direction[k].get(isa, number));
     let (ab, bc, ca) = (three!(k => b[k] - a[k]), three!(k => c[k] - b[k]), three!(k => a[k] - c[k]));
     let (s0, plain0) = diffprod(isa, ab[2], ca[1], ab[1], ca[2]);
@@ -168,17 +157,13 @@ impl Packet {
     /// Writes what ray i has found to the i-th of `places`.
     #[inline(always)]
     pub fn write<I: Isa>(&self, isa: I, bound: &Bound, hits_of: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
-        let mut hits = Hits { which: [NONE; 2], ..Hits::default() };
         let mut points_of = Points::default();
         for v in 0..self.vectors::<I>() {
             let first = v * I::Wide::LANES;
             let end = self.count.min(first + I::Wide::LANES);
-            let mut together = 0;
-            for i in first..end {
-                together |= u32::from(self.gather(bound, i, i - first, &mut hits)) << (i - first);
-            }
+            let (mut together, corners) = self.corners(isa, bound, v, end - first);
             if together != 0 {
-                together &= points(isa, self, v, &hits, &mut points_of);
+                together &= points(isa, self, v, corners, &mut points_of);
             }
             for i in first..end {
                 if self.found.leaf.0[i % RAYS] == NONE {
@@ -195,30 +180,29 @@ impl Packet {
         }
     }
 
-    /// Puts the hit of ray `i` into a lane. False: it has none, or lies on an instance.
+    /// The vertices of what the first lanes of vector `v` have hit, and which lanes have; none where the hit lies on an
+    /// instance. Neighbours often hit the same triangle, so each is looked up once.
     #[inline(always)]
-    fn gather(&self, bound: &Bound, i: usize, lane: usize, hits: &mut Hits) -> bool {
-        let leaf = self.found.leaf.0[i % RAYS];
-        if leaf == NONE {
-            return false;
-        }
-        let leaf = &bound.scene.leaves[leaf as usize];
-        if bound.scene.instances[leaf.instance as usize].flags & INSTANCE_IDENTITY == 0 {
-            return false;
-        }
-        // Neighbours often hit the same triangle.
-        let which = [self.found.leaf.0[i % RAYS], self.found.triangle.0[i % RAYS]];
-        if hits.which != which {
-            hits.which = which;
-            let brick = &bound.bricks[leaf.brick as usize];
-            hits.last = brick.vertices(which[1], leaf.offset_high, leaf.offset_low);
-        }
-        for (vertex, to) in hits.last.iter().zip(&mut hits.vertices) {
-            for k in 0..3 {
-                to[k][lane % MOST] = vertex[k];
+    fn corners<I: Isa>(&self, isa: I, bound: &Bound, v: usize, lanes: usize) -> (u32, Corners<I::Wide>) {
+        let (leaves, triangles) = (self.found.leaf.get(isa, v), self.found.triangle.get(isa, v));
+        let mut corners = [[isa.splat(0.0); 3]; 3];
+        let mut left = !leaves.same_bits(isa.splat_bits(NONE)) & (u32::MAX >> (32 - lanes));
+        let mut found = 0;
+        while left != 0 {
+            let i = (v * I::Wide::LANES + left.trailing_zeros() as usize) % RAYS;
+            let (number, triangle) = (self.found.leaf.0[i], self.found.triangle.0[i]);
+            let same = leaves.same_bits(isa.splat_bits(number)) & triangles.same_bits(isa.splat_bits(triangle)) & left;
+            left &= !same;
+            let leaf = &bound.scene.leaves[number as usize];
+            if bound.scene.instances[leaf.instance as usize].flags & INSTANCE_IDENTITY == 0 {
+                continue;
             }
+            found |= same;
+            let brick = &bound.bricks[leaf.brick as usize];
+            let vertices = brick.vertices(triangle, leaf.offset_high, leaf.offset_low);
+            corners = three!(i => three!(k => isa.splat(vertices[i][k]).or_else(same, corners[i][k])));
         }
-        true
+        (found, corners)
     }
 }
 
