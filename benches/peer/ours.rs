@@ -94,7 +94,8 @@ impl Scene {
             occlusion.push(leaving(hit, surface, [t_min, (OCCLUSION_LENGTH / frame.unit) as f32], &mut state));
             diffuse.push(leaving(hit, surface, [t_min, T_INFINITE], &mut state));
         }
-        // As after some frames: bricks are made flat once that has paid.
+        // As after some frames: bricks that have been used are made flat once that has paid.
+        scene.trace(2, true);
         let triangles: u64 = scene.session.scene.resident().bricks.iter().map(|b| u64::from(b.triangle_count)).sum();
         for _ in 0..=triangles / EXTENT.rays() as u64 {
             scene.trace(1, true);

@@ -22,7 +22,9 @@ pub struct BrickCache {
 struct Held {
     place: Slot,
     bytes: Arc<[u8]>,
-    /// Of geometry, the form that is walked faster, once it has been made.
+    /// Of geometry, whether rays have used it,
+    is_used: bool,
+    /// and the form that is walked faster, once it has been made.
     flat: Option<FlatBrick>,
 }
 
@@ -49,7 +51,7 @@ impl BrickCache {
         let loaded = workers.load(requests)?;
         for (load, (item, Shared(payload))) in loads.iter().zip(loaded) {
             self.places.insert(load.slot, (scene.loaded_bytes(item.into()), item));
-            self.held[item.index()] = payload.map(|bytes| Held { place: load.slot, bytes, flat: None });
+            self.held[item.index()] = payload.map(|bytes| Held { place: load.slot, bytes, is_used: false, flat: None });
         }
         Ok(())
     }
@@ -71,20 +73,31 @@ impl BrickCache {
         }
     }
 
-    /// The bricks whose geometry is resident and could be flat.
-    fn geometry_held<'a>(&'a mut self, resident: &'a Resident) -> impl Iterator<Item = (&'a Brick, &'a mut Held, u64)> {
+    /// Notes which bricks rays have used: whether each, by its number.
+    pub fn note_uses(&mut self, uses: impl Iterator<Item = bool>) {
+        for (number, _) in (0..).zip(uses).filter(|&(_, is_used)| is_used) {
+            if let Some(held) = &mut self.held[Item::geometry(number).index()] {
+                held.is_used = true;
+            }
+        }
+    }
+
+    /// The bricks whose geometry is resident and used, and could be flat.
+    fn geometry_used<'a>(&'a mut self, resident: &'a Resident) -> impl Iterator<Item = (&'a Brick, &'a mut Held, u64)> {
         let first = Item::geometry(0).index();
         let held = self.held.iter_mut().skip(first).step_by(Item::geometry(1).index() - first);
         let all = resident.bricks.iter().zip(held);
-        all.filter_map(|(brick, held)| Some((brick, held.as_mut()?, FlatBrick::bytes_of(brick)?)))
+        all.filter_map(|(brick, held)| {
+            Some((brick, held.as_mut().filter(|held| held.is_used)?, FlatBrick::bytes_of(brick)?))
+        })
     }
 
-    /// Makes resident bricks flat, as far as `room` bytes hold all that are, if so many rays have come as they have
-    /// triangles: about so many gain what making them takes. Returns those rays.
+    /// Makes bricks flat that rays have used, as far as `room` bytes hold all that are, if so many rays have come as
+    /// they have triangles: about so many gain what making them takes. Returns those rays.
     pub fn flatten(&mut self, resident: &Resident, rays: u64, room: u64) -> u64 {
         let (mut left, mut triangles) = (room, 0);
         let mut waiting = Vec::new();
-        for (brick, held, bytes) in self.geometry_held(resident) {
+        for (brick, held, bytes) in self.geometry_used(resident) {
             if held.flat.is_some() {
                 left = left.saturating_sub(bytes);
             } else {
@@ -195,5 +208,36 @@ mod tests {
         assert_eq!(load(1, at((1 << 20) - 16)), [false, true, true]);
         // Another page is another place.
         assert_eq!(load(0, Slot { page: 1, offset: 16 }), [true, true, true]);
+    }
+
+    #[test]
+    fn bricks_are_made_flat_that_are_used_and_fit_once_that_pays() {
+        let scene = Arc::new(probe::scene().unwrap());
+        let workers = Workers::new(scene.clone(), HostCache::new(0), 1).unwrap();
+        let mut cache = BrickCache::new(scene.sizes().rows());
+        let resident = scene.resident();
+        let is_narrow = |&brick: &u32| FlatBrick::bytes_of(&resident.bricks[brick as usize]).is_some();
+        let numbers: Vec<u32> = (0..resident.bricks.len() as u32).filter(is_narrow).take(3).collect();
+        let load = |&brick: &u32| Load { item: Item::geometry(brick), slot: at(brick << 20) };
+        cache.load(&scene, &workers, &numbers.iter().map(load).collect::<Vec<_>>()).unwrap();
+        let record = |i: usize| &resident.bricks[numbers[i] as usize];
+        let bytes = |i: usize| FlatBrick::bytes_of(record(i)).unwrap();
+        let triangles = |i: usize| u64::from(record(i).triangle_count);
+        let are_flat = |cache: &BrickCache| {
+            let states = BrickStates::new(resident.bricks.len(), 0);
+            let views = cache.geometry(resident, &states, false, &[]).unwrap();
+            [0, 1, 2].map(|i: usize| views[numbers[i] as usize].flat.is_some())
+        };
+        assert_eq!(cache.flatten(resident, u64::MAX, u64::MAX), 0, "none is used");
+        cache.note_uses((0..=numbers[2]).map(|brick| brick != numbers[1]));
+        let both = triangles(0) + triangles(2);
+        assert_eq!(cache.flatten(resident, both - 1, u64::MAX), 0, "too few rays");
+        assert_eq!(cache.flatten(resident, both, bytes(0).min(bytes(2)) - 1), 0, "no room");
+        assert_eq!(are_flat(&cache), [false; 3]);
+        assert_eq!(cache.flatten(resident, both, bytes(0)), triangles(0), "room for the first");
+        assert_eq!(cache.flatten(resident, both, bytes(0) + bytes(2) - 1), 0, "what is flat takes room");
+        assert_eq!(are_flat(&cache), [true, false, false]);
+        assert_eq!(cache.flatten(resident, triangles(2), bytes(0) + bytes(2)), triangles(2));
+        assert_eq!(are_flat(&cache), [true, false, true]);
     }
 }

@@ -133,8 +133,8 @@ impl CpuExecutor {
         })
     }
 
-    /// Makes bricks flat that the rays of a pass will meet, once that pays. Camera rays gain little. Nodes and triangles
-    /// are counted as those of packed bricks.
+    /// Makes bricks flat that rays meet, once that pays. Camera rays gain little. Nodes and triangles are counted as those
+    /// of packed bricks.
     fn flatten(&mut self, pass: Pass, steps: &[Step]) {
         let gains = pass != Pass::Primary && steps.iter().any(|step| step.is_intersection());
         if gains && self.flat_bytes > 0 && !self.count {
@@ -326,6 +326,9 @@ impl Executor for CpuExecutor {
             }
         }
         let demand: Vec<layout::Demand> = demand.iter().map(Demand::get).collect();
+        if self.flat_bytes > 0 {
+            self.cache.note_uses(demand.iter().map(|demand| demand.rays > 0));
+        }
         let mut report = report::of_counters(&counters.get(), &demand)?;
         report.counters.add_phases(ms_phases);
         report::take_used(&mut report, steps, bricks);
