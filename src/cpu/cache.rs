@@ -134,7 +134,7 @@ impl BrickCache {
         opacity: &'a [[u32; 4]],
     ) -> Result<Vec<BrickView<'a>>, ExecutorError> {
         let view = |(i, brick)| match &self.held[Item::geometry(i as u32).index()] {
-            Some(held) => Ok(BrickView::new(brick, &held.bytes, opacity).with(held.flat.as_ref())),
+            Some(held) => Ok(BrickView::new(brick, &held.bytes, opacity).with_flat(held.flat.as_ref())),
             None if all || bricks.geometry(i).is_some() => Err(missing(Item::geometry(i as u32))),
             None => Ok(BrickView::default()),
         };

@@ -133,8 +133,8 @@ impl CpuExecutor {
         })
     }
 
-    /// Makes bricks flat that rays meet, once that pays. Camera rays gain little. Nodes and triangles are counted as those
-    /// of packed bricks.
+    /// Makes bricks flat that rays meet, once that pays. Camera rays gain little. Nodes and triangles are counted as
+    /// those of packed bricks.
     fn flatten(&mut self, pass: Pass, steps: &[Step]) {
         let gains = pass != Pass::Primary && steps.iter().any(|step| step.is_intersection());
         if gains && self.flat_bytes > 0 && !self.count {

@@ -54,7 +54,7 @@ impl<'a> BrickView<'a> {
     }
 
     /// The same with its other form, where there is one.
-    pub fn with(self, flat: Option<&'a FlatBrick>) -> Self {
+    pub fn with_flat(self, flat: Option<&'a FlatBrick>) -> Self {
         Self { flat, ..self }
     }
 

@@ -22,7 +22,8 @@ pub struct Sight {
 
 impl Sight {
     /// Of a ray in a frame in which the brick lies at an offset. The padding is that of [`super::node::NodeFrame`], for
-    /// the farthest of the brick's bounds.
+    /// the farthest of the brick's bounds: of a distance m to them and an offset p, distances are off by less than
+    /// 4 m + p units, fused or not, and those of triangles reach by 36 m beyond their boxes ([`crate::math::exact`]).
     #[inline(always)]
     pub fn new(ray: &FramedRay, brick: &FlatBrick, offset_high: Vec3, offset_low: Vec3) -> Self {
         let at = each(|k| offset_high[k] + offset_low[k]);

@@ -53,7 +53,7 @@ impl Stage {
             .zip(&self.payloads)
             .zip(&self.flats)
             .map(|((b, words), flat)| {
-                BrickView::new(b, bytemuck::cast_slice(words), &[]).with(flat.as_ref().filter(|_| is_flat))
+                BrickView::new(b, bytemuck::cast_slice(words), &[]).with_flat(flat.as_ref().filter(|_| is_flat))
             })
             .collect();
         let params = Params {
