@@ -102,7 +102,10 @@ impl Demand {
     /// Adds `rays` that enter at `nearest`, as bits of a distance that is not negative.
     pub fn add(&self, rays: u32, nearest: u32) {
         self.rays.fetch_add(rays, Ordering::Relaxed);
-        self.nearest.fetch_min(nearest, Ordering::Relaxed);
+        // Reading leaves the line to all cores.
+        if nearest < self.nearest.load(Ordering::Relaxed) {
+            self.nearest.fetch_min(nearest, Ordering::Relaxed);
+        }
     }
 
     /// Adds a ray that enters at `near`.

@@ -9,4 +9,5 @@ pub mod median;
 pub mod octahedral;
 pub mod random;
 pub mod sampling;
+pub mod sines;
 pub mod welford;

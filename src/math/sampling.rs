@@ -97,39 +97,68 @@ pub fn random4(pixel: u32, sample: u32, seed: u32) -> [u32; 4] {
     [a, b, c, pcg(c)]
 }
 
-/// Owen's scrambling of a word whose bits are reversed, by a hash (Laine, Karras 2011, with Vegdahl's constants).
-fn scrambled(word: u32, hash: u32) -> u32 {
-    let mut x = word;
-    x ^= x.wrapping_mul(0x3d20_adea);
-    x = x.wrapping_add(hash);
-    x = x.wrapping_mul((hash >> 16) | 1);
-    x ^= x.wrapping_mul(0x0552_6c56);
-    x ^= x.wrapping_mul(0x53a2_2864);
-    x
+/// Owen's scrambling of words whose bits are reversed, by hashes (Laine, Karras 2011, with Vegdahl's constants).
+#[inline(always)]
+fn scrambled<const N: usize>(mut words: [u32; N], hashes: [u32; N]) -> [u32; N] {
+    for (x, hash) in words.iter_mut().zip(hashes) {
+        *x ^= x.wrapping_mul(0x3d20_adea);
+        *x = x.wrapping_add(hash);
+        *x = x.wrapping_mul((hash >> 16) | 1);
+        *x ^= x.wrapping_mul(0x0552_6c56);
+        *x ^= x.wrapping_mul(0x53a2_2864);
+        *x = x.reverse_bits();
+    }
+    words
 }
 
-/// Two words of a pixel's sample; see the kernels' `spread2`.
-fn spread2(index: u32, hash: u32) -> [u32; 2] {
-    let own = scrambled(index.reverse_bits(), hash).reverse_bits();
-    let masks = [0x5555_5555, 0x3333_3333, 0x0f0f_0f0f, 0x00ff_00ff, 0x0000_ffff];
-    let sums = (0..5).zip(masks).fold(own, |sums, (log2, mask)| sums ^ (sums >> (1 << log2) & mask));
-    let by_first = pcg(hash);
-    [scrambled(own, by_first).reverse_bits(), scrambled(sums, pcg(by_first)).reverse_bits()]
+/// Two words of a pixel's sample by every hash; see the kernels' `spread2`.
+#[inline(always)]
+fn spread2<const N: usize>(index: u32, hashes: [u32; N]) -> [[u32; N]; 2] {
+    let own = scrambled([index.reverse_bits(); N], hashes);
+    let mut sums = own;
+    for (log2, mask) in [0x5555_5555, 0x3333_3333, 0x0f0f_0f0f, 0x00ff_00ff, 0x0000_ffff].into_iter().enumerate() {
+        for sum in &mut sums {
+            *sum ^= *sum >> (1 << log2) & mask;
+        }
+    }
+    let mut by_first = hashes;
+    for hash in &mut by_first {
+        *hash = pcg(*hash);
+    }
+    let mut by_second = by_first;
+    for hash in &mut by_second {
+        *hash = pcg(*hash);
+    }
+    [scrambled(own, by_first), scrambled(sums, by_second)]
+}
+
+/// [`points4`] of several seeds, word by word. `BOTH` is twice `N`: as many vectors are made at once.
+#[inline(always)]
+pub fn points4_of<const N: usize, const BOTH: usize>(pixel: u32, stream: u32, seeds: [u32; N]) -> [[u32; N]; 4] {
+    const { assert!(BOTH == 2 * N) }
+    let mut hashes = [0; BOTH];
+    for (k, seed) in seeds.into_iter().enumerate() {
+        hashes[k] = pcg(pixel ^ pcg((stream >> 24) ^ pcg(seed)));
+        hashes[N + k] = pcg(hashes[k] ^ GOLDEN);
+    }
+    let [first, second] = spread2(stream & 0x00ff_ffff, hashes);
+    let mut words = [[0; N]; 4];
+    for k in 0..N {
+        (words[0][k], words[1][k], words[2][k], words[3][k]) = (first[k], second[k], first[N + k], second[N + k]);
+    }
+    words
 }
 
 /// Four words for what a stream draws at a sample of a pixel, two points that its samples spread evenly each: the low
 /// 24 bits of `stream` are the sample, the others tell what is drawn. The kernels' `points4`, bit for bit.
 pub fn points4(pixel: u32, stream: u32, seed: u32) -> [u32; 4] {
-    let hash = pcg(pixel ^ pcg((stream >> 24) ^ pcg(seed)));
-    let sample = stream & 0x00ff_ffff;
-    let ([a, b], [c, d]) = (spread2(sample, hash), spread2(sample, pcg(hash ^ GOLDEN)));
-    [a, b, c, d]
+    points4_of::<1, 2>(pixel, stream, [seed]).map(|[word]| word)
 }
 
 /// Two numbers in [0, 1), of the first two words of [`points4`]: the kernels' `points2`.
 pub fn points2(pixel: u32, stream: u32, seed: u32) -> [f32; 2] {
-    let [a, b, ..] = points4(pixel, stream, seed);
-    [a, b].map(|x| (x >> 8) as f32 / 16_777_216.0)
+    let hash = pcg(pixel ^ pcg((stream >> 24) ^ pcg(seed)));
+    spread2(stream & 0x00ff_ffff, [hash]).map(|[word]| (word >> 8) as f32 / 16_777_216.0)
 }
 
 /// Frames after which [`pixel_jitter`] repeats.

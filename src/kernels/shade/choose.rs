@@ -1,12 +1,13 @@
 //! Draws a lamp for a surface: one of the emitters, or a direction to the environment. Twin of
 //! `shaders/shade/choose.wgsl`.
 
-use super::lamps::{drawn_light, environment_sample, lamp_words, unit};
+use super::lamps::{candidate_words, drawn_light, environment_samples, unit};
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_DISTANT_GROUP, EMITTER_GROUP, EMITTER_KIND, EMITTER_PARALLELOGRAM, EMITTER_TRIANGLE,
     EMITTER_TWO_SIDED, Emitter, NONE, Origin,
 };
+use crate::kernels::simd::isa::{Isa, Work};
 use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most};
 use crate::math::exact::{divide, square_root};
 use crate::math::sampling::pcg;
@@ -17,7 +18,7 @@ const LEAST_SQUARED: f32 = 1.0e-12;
 const GREATEST_SUM: f32 = 1.0e30;
 
 /// Directions to the environment from which one is drawn.
-const CANDIDATES: u32 = 4;
+const CANDIDATES: usize = 4;
 /// What a grazing direction counts for beside one along the normal: the normal that is shaded may be another.
 const GRAZING: f32 = 0.2;
 
@@ -121,24 +122,42 @@ pub fn choose_emitter(emitters: &[Emitter], count: u32, random: u32, p: Vec3, n:
     chosen
 }
 
-/// One of a few directions to the environment, by its light and the cosine at a surface that is turned to n; see the
-/// kernel.
-pub fn choose_direction(bound: &Bound, index: usize, origins: &[Origin], n: Vec3) -> Chosen {
-    let (mut number, mut weight, mut sum) = (0, 0.0, 0.0);
-    for k in 0..CANDIDATES {
-        let words = lamp_words(bound, index, k, origins);
-        let drawn = environment_sample(bound, words);
-        let cosine = dot(n, drawn.direction);
-        // What lies behind is not looked up.
-        if cosine.is_nan() || cosine <= 0.0 {
-            continue;
+/// Chooses one of a few directions to the environment, by its light and the cosine at a surface that is turned to
+/// `normal`; see the kernel.
+pub struct ChooseDirection<'a, 'b> {
+    /// What is bound.
+    pub bound: &'a Bound<'b>,
+    /// The ray.
+    pub index: usize,
+    /// Where rays of bounces come from.
+    pub origins: &'a [Origin],
+    /// Of the surface, a unit vector.
+    pub normal: Vec3,
+}
+
+impl Work for ChooseDirection<'_, '_> {
+    type Out = (Chosen, Vec3);
+
+    #[inline(always)]
+    fn run<I: Isa>(self, _: I) -> (Chosen, Vec3) {
+        let Self { bound, index, origins, normal } = self;
+        let words = candidate_words::<CANDIDATES, { 2 * CANDIDATES }>(bound, index, origins);
+        let drawn = environment_samples(bound, words);
+        let (mut number, mut weight, mut sum) = (0, 0.0, 0.0);
+        for (k, drawn) in drawn.iter().enumerate() {
+            let cosine = dot(normal, drawn.direction);
+            // What lies behind is not looked up.
+            if cosine.is_nan() || cosine <= 0.0 {
+                continue;
+            }
+            let own = luminance_of(drawn_light(bound, drawn)) * mix(GRAZING, 1.0, cosine);
+            sum += own;
+            if unit(pcg(words[3][k])) * sum < own {
+                (number, weight) = (k, own);
+            }
         }
-        let own = luminance_of(drawn_light(bound, &drawn)) * mix(GRAZING, 1.0, cosine);
-        sum += own;
-        if unit(pcg(words[3])) * sum < own {
-            (number, weight) = (k, own);
-        }
+        let probability = if weight > 0.0 { CANDIDATES as f32 * weight / sum } else { 0.0 };
+        let number = if weight > 0.0 { number } else { 0 };
+        (Chosen { emitter: number as u32, probability }, drawn[number].direction)
     }
-    let probability = if weight > 0.0 { CANDIDATES as f32 * weight / sum } else { 0.0 };
-    Chosen { emitter: if weight > 0.0 { number } else { 0 }, probability }
 }

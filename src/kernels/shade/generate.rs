@@ -1,10 +1,10 @@
 //! Rays from the camera and from hits: twins of `shaders/shade/generate_primary.wgsl`, `generate_shadow.wgsl`,
 //! `generate_around.wgsl`, `generate_glossy.wgsl` and `start_hits.wgsl`.
 
-use super::choose::{Chosen, choose_direction, choose_emitter};
+use super::choose::{ChooseDirection, Chosen, choose_emitter};
 use super::cones::{self, widen};
 use super::gloss::{Drawn, Gloss, left_within};
-use super::lamps::{environment_sample, lamp_words, shines};
+use super::lamps::{lamp_words, shines};
 use super::more::Shown;
 use super::random::{disc_point, tangent};
 use super::shade::Pixels;
@@ -14,9 +14,11 @@ use crate::kernels::layout::{
     PARAM_SCATTER, Params, Ray, Surface, T_INFINITE, UNSHARED,
 };
 use crate::kernels::rays::{RaySet, start_hit};
+use crate::kernels::simd::isa::Best;
 use crate::kernels::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
 use crate::math::exact::barrier;
 use crate::math::sampling::{pcg, points2, points4};
+use crate::math::sines::sin_cos;
 use bricks::Material;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -109,7 +111,7 @@ fn toward(e: &Emitter, start: Vec3, r: [f32; 2]) -> Vec3 {
 /// One ray from every hit of the shaded set to a point of the pass's lamp; from surfaces that face away, none.
 pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, origins: &[Origin]) {
     let p = bound.params;
-    let sun = xyz(p.sun);
+    let (sun, best) = (xyz(p.sun), Best::detect());
     for_each_new(own, |index| {
         let surface = &seen.surfaces[index];
         let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
@@ -131,9 +133,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, origins: 
                     t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
                 }
             } else if bound.has(PARAM_ENVIRONMENT) {
-                chosen = choose_direction(bound, index, origins, surface.normal);
-                let words = lamp_words(bound, index, chosen.emitter, origins);
-                ray.direction = environment_sample(bound, words).direction;
+                (chosen, ray.direction) = best.run(ChooseDirection { bound, index, origins, normal: surface.normal });
                 faces = chosen.probability > 0.0;
             } else if p.sun_radius > 0.0 {
                 let disc = disc_point(r).map(|x| x * p.sun_radius);
@@ -157,7 +157,7 @@ fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
     let mut a = p.around;
     let r = points2(bound.pixel_of(index, &[]), p.stream, p.seed);
     let angle = a[3] * r[0];
-    let (c, s) = (angle.cos(), angle.sin());
+    let [[s], [c]] = sin_cos([angle]);
     let x = tangent(normal);
     let y = cross(normal, x);
     if bound.has(PARAM_SCATTER) {

@@ -6,7 +6,8 @@ use crate::kernels::layout::{
     Params,
 };
 use crate::kernels::vector::{Vec3, cross, dot, each, least, mix, most, normalize};
-use crate::math::sampling::{GOLDEN, pcg, points4};
+use crate::math::sampling::{GOLDEN, pcg, points4, points4_of};
+use crate::math::sines::sin_cos;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// The high word of a product.
@@ -22,11 +23,29 @@ pub(crate) fn unit(word: u32) -> f32 {
 /// Which random numbers the ray of a pixel takes to draw candidate `number` for a lamp: those that start at hits of
 /// bounces take some of their own in every direction that their paths begin with.
 pub fn lamp_words(bound: &Bound, index: usize, number: u32, origins: &[Origin]) -> [u32; 4] {
-    let mut pixel = bound.pixel_of(index, origins);
-    if bound.has(PARAM_BOUNCE) {
-        pixel ^= pcg(origins[index].direction.wrapping_add(1));
-    }
-    points4(pixel, bound.params.stream, bound.params.seed ^ number.wrapping_mul(GOLDEN))
+    points4(lamp_pixel(bound, index, origins), bound.params.stream, candidate_seed(bound, number))
+}
+
+/// [`lamp_words`] of the first `N` candidates, word by word; `BOTH` is twice `N`.
+#[inline(always)]
+pub fn candidate_words<const N: usize, const BOTH: usize>(
+    bound: &Bound,
+    index: usize,
+    origins: &[Origin],
+) -> [[u32; N]; 4] {
+    let seeds = std::array::from_fn(|number| candidate_seed(bound, number as u32));
+    points4_of::<N, BOTH>(lamp_pixel(bound, index, origins), bound.params.stream, seeds)
+}
+
+#[inline(always)]
+fn lamp_pixel(bound: &Bound, index: usize, origins: &[Origin]) -> u32 {
+    let pixel = bound.pixel_of(index, origins);
+    if bound.has(PARAM_BOUNCE) { pixel ^ pcg(origins[index].direction.wrapping_add(1)) } else { pixel }
+}
+
+#[inline(always)]
+fn candidate_seed(bound: &Bound, number: u32) -> u32 {
+    bound.params.seed ^ number.wrapping_mul(GOLDEN)
 }
 
 /// The angle of the point (x, y) from the x axis, -pi to pi: Abramowitz, Stegun, "Handbook of Mathematical Functions",
@@ -56,9 +75,15 @@ pub fn angle_of(y: f32, x: f32) -> f32 {
 
 fn environment_texel(bound: &Bound, column: i32, row: i32) -> Vec3 {
     let Params { environment_width, environment_height, .. } = *bound.params;
-    let x = column.rem_euclid(environment_width as i32);
+    let width = environment_width as i32;
+    // Places lie less than one width beyond the image; a division takes long.
+    let x = match column {
+        _ if (0..width).contains(&column) => column,
+        _ if (-width..0).contains(&column) => column + width,
+        _ => column.rem_euclid(width),
+    };
     let y = row.clamp(0, environment_height as i32 - 1);
-    crate::kernels::vector::xyz(bound.lamps.lamps().texels()[(y * environment_width as i32 + x) as usize])
+    crate::kernels::vector::xyz(bound.lamps.lamps().texels()[(y * width + x) as usize])
 }
 
 /// Radiance at a place in texels, between their centres bilinearly.
@@ -116,6 +141,7 @@ pub fn outweighs(own: f32, other: f32) -> f32 {
 }
 
 /// A direction to the environment that was drawn.
+#[derive(Clone, Copy, Debug)]
 pub struct EnvironmentSample {
     /// A unit vector.
     pub direction: Vec3,
@@ -129,24 +155,37 @@ pub struct EnvironmentSample {
 /// A direction drawn by the density that the texels state: a texel by their table, a place in it evenly over both
 /// angles.
 pub fn environment_sample(bound: &Bound, words: [u32; 4]) -> EnvironmentSample {
+    let [sample] = environment_samples(bound, words.map(|word| [word]));
+    sample
+}
+
+/// Several of them, by words as [`candidate_words`] gives them.
+#[inline(always)]
+pub fn environment_samples<const N: usize>(bound: &Bound, words: [[u32; N]; 4]) -> [EnvironmentSample; N] {
     let p = bound.params;
-    let mut texel = multiply_high(words[0], p.environment_width * p.environment_height);
-    let entry = bound.lamps.lamps().texel_table()[texel as usize];
-    if words[1] >= entry[0] {
-        texel = entry[1];
-    }
-    let corner = [(texel % p.environment_width) as f32, (texel / p.environment_width) as f32];
-    let place = [corner[0] + unit(words[2]), corner[1] + unit(words[3])];
     let size = environment_size(p);
-    let share = [place[0] / size[0], place[1] / size[1]];
-    let around = TAU * (share[0] - 0.5);
-    let down = PI * share[1];
-    let level = down.sin();
-    let x = level * around.sin();
-    let z = -level * around.cos();
-    let turn = p.environment_turn;
-    let direction = [turn[0] * x + turn[1] * z, down.cos(), turn[0] * z - turn[1] * x];
-    EnvironmentSample { direction, place, texel, level }
+    let (mut places, mut texels, mut around, mut down) = ([[0.0; 2]; N], [0; N], [0.0; N], [0.0; N]);
+    for k in 0..N {
+        let mut texel = multiply_high(words[0][k], p.environment_width * p.environment_height);
+        let entry = bound.lamps.lamps().texel_table()[texel as usize];
+        if words[1][k] >= entry[0] {
+            texel = entry[1];
+        }
+        let corner = [(texel % p.environment_width) as f32, (texel / p.environment_width) as f32];
+        let place = [corner[0] + unit(words[2][k]), corner[1] + unit(words[3][k])];
+        around[k] = TAU * (place[0] / size[0] - 0.5);
+        down[k] = PI * (place[1] / size[1]);
+        (places[k], texels[k]) = (place, texel);
+    }
+    let ([sines_around, cosines_around], [sines_down, cosines_down]) = (sin_cos(around), sin_cos(down));
+    std::array::from_fn(|k| {
+        let level = sines_down[k];
+        let x = level * sines_around[k];
+        let z = -level * cosines_around[k];
+        let turn = p.environment_turn;
+        let direction = [turn[0] * x + turn[1] * z, cosines_down[k], turn[0] * z - turn[1] * x];
+        EnvironmentSample { direction, place: places[k], texel: texels[k], level }
+    })
 }
 
 /// Radiance along a direction that was drawn over its density; zero where none is to be drawn.

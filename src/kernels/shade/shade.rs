@@ -311,9 +311,22 @@ pub fn add_occlusion(
 
 /// Counts, per brick, the final hits of a pass.
 pub fn hit_demand(bound: &Bound, own: &RaySet) {
-    own.surfaces.par_chunks(RUN).for_each(|run| {
-        for hits in run.chunk_by(|a, b| a.leaf == b.leaf).filter(|hits| hits[0].leaf != NONE) {
-            bound.demand[bound.brick_of(hits[0].leaf)].add(hits.len() as u32, 0);
+    own.surfaces.par_chunks(8 * RUN).for_each(|run| {
+        // Rays of a bounce hit leaves in no order: their hits are added up before what all cores write is touched.
+        let mut sums = [(NONE, 0); 256];
+        let add = |(leaf, hits): (u32, u32)| {
+            if hits > 0 {
+                bound.demand[bound.brick_of(leaf)].add(hits, 0);
+            }
+        };
+        for leaf in run.iter().map(|surface| surface.leaf).filter(|&leaf| leaf != NONE) {
+            let sum = &mut sums[leaf as usize % 256];
+            if sum.0 != leaf {
+                add(*sum);
+                *sum = (leaf, 0);
+            }
+            sum.1 += 1;
         }
+        sums.into_iter().for_each(add);
     });
 }
