@@ -81,6 +81,16 @@ fn test_triangle(r: ptr<function, BrickRay>, best: ptr<function, Best>, triangle
     return true;
 }
 
+// Writes what a ray is told that asks whether it hits anything: no ray starts from there. By what probability it was
+// drawn counts no more.
+fn write_occluder(best: Best, ray: u32) {
+    hits[ray].t = best.t;
+    hits[ray].id = best.id;
+    surfaces[ray].leaf = best.leaf;
+    surfaces[ray].triangle = best.triangle;
+    surfaces[ray].area = 0.0;
+}
+
 // Writes a hit that became the best in this dispatch: distance, id, barycentrics, and the point secondary rays start
 // from.
 fn write_hit(r: ptr<function, BrickRay>, best: Best, world_direction: vec3<f32>, ray: u32) {

@@ -83,9 +83,13 @@ fn root_group(flip: u32) -> vec2<u32> {
 // Writes what the walk found, if it found something nearer than was known.
 fn finish_walk(r: ptr<function, BrickRay>, world: FramedRay, best: Best, ray: u32) {
     if best.leaf != NONE {
-        enter_leaf(r, world, best.leaf);
-        enter_brick(r, leaves[best.leaf].brick);
-        write_hit(r, best, world.direction, ray);
+        if (params.flags & PARAM_ANY_HIT) != 0u {
+            write_occluder(best, ray);
+        } else {
+            enter_leaf(r, world, best.leaf);
+            enter_brick(r, leaves[best.leaf].brick);
+            write_hit(r, best, world.direction, ray);
+        }
     }
     if COUNT {
         atomicAdd(&counters[COUNTER_NODES], nodes_visited);

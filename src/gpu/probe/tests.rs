@@ -106,7 +106,14 @@ fn a_pipeline_that_differs_is_named() {
             list,
             "Surface(point, best.leaf,",
             "Surface(point + point * 0x1p-22, best.leaf,",
-            vec![format!("{list}{closest}{all}"), format!("{list}{any}{all}")],
+            vec![format!("{list}{closest}{all}")],
+        ),
+        // The same, where rays ask whether there is any hit: those of another leaf.
+        (
+            list,
+            "surfaces[ray].leaf = best.leaf;",
+            "surfaces[ray].leaf = best.leaf + 1u;",
+            vec![format!("{list}{any}{all}")],
         ),
     ];
     for (kernel, sound, broken, lines) in defects {

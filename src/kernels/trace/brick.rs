@@ -35,6 +35,14 @@ impl Best {
         let (before, source) = (&slot.hit, slot.surface.source);
         Self { t: before.t, id: before.id, leaf: NONE, triangle: 0, hit: TriangleHit::default(), source }
     }
+
+    /// What a ray is told that asks whether it hits anything: no ray starts from there. By what probability it was
+    /// drawn counts no more.
+    #[inline(always)]
+    pub fn write_occluder(&self, hit: &mut Hit, surface: &mut Surface) {
+        (hit.t, hit.id) = (self.t, self.id);
+        (surface.leaf, surface.triangle, surface.area) = (self.leaf, self.triangle, 0.0);
+    }
 }
 
 impl BrickRay<'_> {

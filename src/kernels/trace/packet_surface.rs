@@ -6,7 +6,7 @@ use super::brick::Best;
 use super::packet::{Packet, RAYS};
 use super::walk_brick::write_found;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, Surface};
+use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, Surface};
 use crate::kernels::simd::isa::{Isa, inside};
 use crate::kernels::simd::wide::{Wide, three};
 use crate::math::exact::{LEAST_COORDINATE, LEAST_SHEAR, OFFSET_ULPS, THIRD};
@@ -157,6 +157,13 @@ impl Packet {
     /// Writes what ray i has found to the i-th of `places`.
     #[inline(always)]
     pub fn write<I: Isa>(&self, isa: I, bound: &Bound, hits_of: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+        if bound.has(PARAM_ANY_HIT) {
+            for i in (0..self.count).filter(|&i| self.found.leaf.0[i % RAYS] != NONE) {
+                let place = places[i] as usize;
+                self.best(i).write_occluder(&mut hits_of[place], &mut surfaces[place]);
+            }
+            return;
+        }
         let mut points_of = Points::default();
         for v in 0..self.vectors::<I>() {
             let first = v * I::Wide::LANES;

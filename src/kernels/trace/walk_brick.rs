@@ -4,7 +4,9 @@ use super::brick::Best;
 use super::leaf::BrickRay;
 use super::node::{FramedRay, inner_before};
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::layout::{COUNTER_NODES, COUNTER_STACK_OVERFLOW, COUNTER_TRIANGLES, Hit, NONE, Surface};
+use crate::kernels::layout::{
+    COUNTER_NODES, COUNTER_STACK_OVERFLOW, COUNTER_TRIANGLES, Hit, NONE, PARAM_ANY_HIT, Surface,
+};
 use crate::kernels::simd::isa::Isa;
 
 /// MAX_BRICK_HEIGHT + MAX_TOP_HEIGHT and the entries that a change of tree leaves.
@@ -116,7 +118,9 @@ impl BrickRay<'_> {
 /// Writes what a walk found, if it found something nearer than was known.
 #[inline(always)]
 pub fn write_found(bound: &Bound, world: &FramedRay, best: &Best, hit: &mut Hit, surface: &mut Surface) {
-    if best.leaf != NONE {
+    if best.leaf != NONE && bound.has(PARAM_ANY_HIT) {
+        best.write_occluder(hit, surface);
+    } else if best.leaf != NONE {
         let mut r = BrickRay::outside(world);
         r.enter_leaf(bound.scene, world, best.leaf);
         r.enter_brick(bound, bound.brick_of(best.leaf));
