@@ -11,8 +11,8 @@ use brickwalk_convert::build::{BuildSettings, BuildSummary, LatticeStep, build_s
 use brickwalk_convert::progress::Progress;
 use brickwalk_convert::source::{InMemory, Source};
 use brickwalk_scenes::{
-    Error, GltfForm, Kind, Settings, Stiff, far_path, generate, stiff, write_far_path, write_gltf, write_motion,
-    write_paths,
+    Error, GltfForm, Kind, Settings, Stiff, far_path, generate, is_ply, stiff, write_far_path, write_gltf,
+    write_motion, write_paths, write_ply,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -24,8 +24,8 @@ use std::time::Instant;
 pub fn run(args: &SceneArgs) -> Result<()> {
     let start = Instant::now();
     let progress = interrupt::job();
-    check_output(&args.output, &["bricks", "glb", "gltf"], args.build.work.scratch.as_deref())?;
-    if GltfForm::of(&args.output).is_some() {
+    check_output(&args.output, &["bricks", "glb", "gltf", "ply"], args.build.work.scratch.as_deref())?;
+    if is_for_others(&args.output) {
         refuse_building(&args.build)?;
     }
     let (paths, summary) = in_pool(args.build.work.threads, || match args.kind {
@@ -38,7 +38,7 @@ pub fn run(args: &SceneArgs) -> Result<()> {
             summarise(&args.output, &summary, start, &mut note)?;
             with_fields(&args.build, &args.output)?;
         }
-        Written::Gltf { triangles } => note(&format!(
+        Written::ForOthers { triangles } => note(&format!(
             "{}: {} with instances, {:.1} s\n",
             args.output.display(),
             counted(triangles, "triangle"),
@@ -91,8 +91,8 @@ fn made_stiff(args: &SceneArgs, progress: &Progress) -> Result<(Vec<PathBuf>, Wr
         let most = Stiff::MOST_TRIANGLES;
         return Err(Usage(format!("--triangles: a stiff scene has at most {most} triangles, not {triangles}")).into());
     }
-    if case == Stiff::Empty && GltfForm::of(&args.output).is_some() {
-        return Err(Usage("--case empty: glTF cannot hold an empty scene; write S.bricks".into()).into());
+    if case == Stiff::Empty && is_for_others(&args.output) {
+        return Err(Usage("--case empty: glTF and PLY hold no empty scenes; write S.bricks".into()).into());
     }
     let scene = stiff(case, case.size_of(triangles), args.seed);
     let path = far_path(&scene);
@@ -109,19 +109,25 @@ fn made_stiff(args: &SceneArgs, progress: &Progress) -> Result<(Vec<PathBuf>, Wr
 
 /// Writes a scene in the form that the name of the file stands for.
 fn write(scene: &dyn Source, output: &Path, settings: &BuildSettings, progress: &Progress) -> Result<Written> {
-    let Some(form) = GltfForm::of(output) else {
-        return Ok(Written::Bricks(Box::new(usage(build_source(scene, settings, output, progress))?)));
-    };
-    write_gltf(scene, output, form, progress)?;
+    match GltfForm::of(output) {
+        Some(form) => write_gltf(scene, output, form, progress)?,
+        None if is_ply(output) => write_ply(scene, output, progress)?,
+        None => return Ok(Written::Bricks(Box::new(usage(build_source(scene, settings, output, progress))?))),
+    }
     let outline = scene.outline();
     let triangles = outline.placements.iter().map(|p| outline.meshes[p.mesh as usize].triangle_count()).sum();
-    Ok(Written::Gltf { triangles })
+    Ok(Written::ForOthers { triangles })
+}
+
+/// Whether a file is one that other programs read.
+fn is_for_others(output: &Path) -> bool {
+    GltfForm::of(output).is_some() || is_ply(output)
 }
 
 /// What became of a scene.
 enum Written {
     Bricks(Box<BuildSummary>),
-    Gltf { triangles: u64 },
+    ForOthers { triangles: u64 },
 }
 
 /// Refuses options that have no meaning where nothing is cut into bricks.
@@ -138,7 +144,9 @@ fn refuse_building(args: &BuildArgs) -> Result<()> {
         ("--displacement", args.displacement),
     ];
     match given.into_iter().find(|(_, is_given)| *is_given) {
-        Some((option, _)) => Err(Usage(format!("{option}: only for .bricks files; leave it out for glTF")).into()),
+        Some((option, _)) => {
+            Err(Usage(format!("{option}: only for .bricks files; leave it out for glTF and PLY")).into())
+        }
         None => Ok(()),
     }
 }

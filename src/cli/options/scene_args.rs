@@ -149,8 +149,8 @@ pub struct SceneArgs {
     /// Which stiff scene: one of the cases below [default: none, stiff needs one]
     #[arg(long, value_name = "NAME")]
     pub case: Option<Stiff>,
-    /// The file to write: S.bricks, or S.glb or S.gltf (with S.bin) for other programs; S.near.json and S.far.json,
-    /// camera paths, are written beside it, for stiff scenes the latter alone
+    /// The file to write: S.bricks, or S.glb, S.gltf (with S.bin) or S.ply (triangles alone) for other programs;
+    /// S.near.json and S.far.json, camera paths, are written beside it, for stiff scenes the latter alone
     #[arg(short, long, value_name = "S.bricks")]
     pub output: PathBuf,
     /// Triangles of the scene with its instances, about; up to 150M, of cornell and stiff scenes up to 10M [default:

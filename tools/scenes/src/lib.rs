@@ -38,4 +38,4 @@ pub use scene::Scene;
 pub use settings::{Kind, Settings};
 pub use soup::{SoupKind, rotated_instances, soup};
 pub use stiff::{Stiff, far_path, moved, one_mesh, stiff};
-pub use write::{GltfForm, write_far_path, write_gltf, write_motion, write_paths};
+pub use write::{GltfForm, is_ply, write_far_path, write_gltf, write_motion, write_paths, write_ply};

@@ -4,5 +4,6 @@ mod city;
 mod common;
 mod gltf;
 mod kinds;
+mod ply;
 mod soup;
 mod stiff;
