@@ -20,7 +20,8 @@ pub struct Effects {
     /// have been reflected, and each hit is lit as the first is.
     pub bounces: u32,
     /// Greatest random turn of the directions of occlusion and diffuse rays about the normal, degrees from 0 to 360;
-    /// each pixel has one of its own (CHC+RT §5.3). Small turns keep neighbouring rays alike.
+    /// each pixel has one of its own (CHC+RT §5.3). Small turns keep neighbouring rays alike. With 360 pixels do not
+    /// share the heights of directions, either.
     pub turn_degrees: f32,
 }
 

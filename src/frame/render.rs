@@ -235,7 +235,7 @@ impl Band<'_> {
             let mut view =
                 camera_view(engine.scene.resident(), camera, &engine.light, &effects, engine.size, sample, seed);
             view.params.first_row = first_row;
-            view.directions.scatter = engine.settings.guides;
+            view.directions.scatter |= engine.settings.guides;
             if engine.settings.only_chosen {
                 view.params.traced_one_in = engine.settings.correct_one_in;
             }

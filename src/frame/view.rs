@@ -63,7 +63,7 @@ pub fn camera_view(
         occlusion_length: effects.occlusion.map_or(0.0, |occlusion| (occlusion.length / frame.unit) as f32),
         diffuse: effects.diffuse.unwrap_or(0),
         turn: effects.turn_degrees.to_radians(),
-        scatter: false,
+        scatter: effects.turn_degrees >= 360.0,
         lod: Lod::default(),
         glossy: effects.glossy,
         refracts: effects.refracts(),

@@ -107,7 +107,8 @@ pub struct Directions {
     pub diffuse: u32,
     /// Greatest random turn about the normal, radians.
     pub turn: f32,
-    /// Every pixel has directions of its own, all over the hemisphere: what filters over pixels and frames needs.
+    /// Every pixel has directions of its own, all over the hemisphere: what filters over pixels and frames needs, and
+    /// means over few directions that are to be right.
     pub scatter: bool,
     /// What surfaces reflect otherwise than diffusely comes by rays of its own, too.
     pub glossy: bool,

@@ -80,9 +80,10 @@ settings! {
         diffuse_rays: u32 = 4, "--diffuse-rays N", RAYS, "", Effects, Usual;
         /// Every triangle stops every ray, whatever its alpha.
         opaque: bool = false, "--opaque", Rule::Any, "", Effects, Expert;
-        /// Greatest random turn of the directions of `ao` and `diffuse` about the normal, or full. A small one keeps
-        /// rays of neighbouring pixels alike, and shows ghosts of edges. --denoise and --taa give every pixel
-        /// directions of its own instead.
+        /// Greatest random turn of the directions of `ao` and `diffuse` about the normal. A small one keeps rays of
+        /// neighbouring pixels alike, and shows ghosts of edges; below `full` all pixels share the heights of
+        /// directions, so that few of them make pictures too bright or too dark. `full`, --denoise and --taa give every
+        /// pixel directions of its own, all over the hemisphere.
         rotation: Turn = Turn::FULL, "--rotation DEG|full", Rule::Real(0.0, 360.0), "degrees", Effects, Expert;
 
         /// Direction towards the sun, world space, any length.

@@ -255,7 +255,7 @@ value_of_numbers!(Direction, Plane, Rectangle);
 pub struct Turn(pub f32);
 
 impl Turn {
-    /// Any turn.
+    /// Any turn, and any height above the surface.
     pub const FULL: Self = Self(360.0);
 }
 

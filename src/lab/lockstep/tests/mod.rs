@@ -155,7 +155,8 @@ fn effects() -> Effects {
         diffuse: Some(1),
         glossy: true,
         bounces: 1,
-        turn_degrees: 360.0,
+        // All of them would scatter directions in every frame.
+        turn_degrees: 350.0,
     }
 }
 
