@@ -200,10 +200,12 @@ mod tests {
         scene(&options("a.glb", "--threads 1")).unwrap();
         scene(&options("b.GLB", "--threads 2")).unwrap();
         scene(&options("c.gltf", "")).unwrap();
+        scene(&options("d.PLY", "")).unwrap();
         let read = |name: &str| std::fs::read(at(name)).unwrap();
         assert!(read("a.glb").starts_with(b"glTF") && read("a.glb") == read("b.GLB"));
         assert!(read("c.gltf").starts_with(b"{") && read("a.glb").ends_with(&read("c.bin")));
-        for name in ["a.near.json", "b.far.json", "c.near.json"] {
+        assert!(read("d.PLY").starts_with(b"ply\nformat binary_little_endian 1.0\n"));
+        for name in ["a.near.json", "b.far.json", "c.near.json", "d.near.json"] {
             assert!(at(name).exists(), "{name}");
         }
         let before = std::fs::read_dir(folder.path()).unwrap().count();
@@ -218,8 +220,10 @@ mod tests {
             "--lod on",
         ];
         for option in options_of_building {
-            let error = scene(&options("d.glb", option)).unwrap_err();
-            assert!(error.is::<Usage>() && error.to_string().contains(".bricks"), "{option}: {error:?}");
+            for name in ["e.glb", "e.ply"] {
+                let error = scene(&options(name, option)).unwrap_err();
+                assert!(error.is::<Usage>() && error.to_string().contains(".bricks"), "{option}: {error:?}");
+            }
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), before);
     }

@@ -50,7 +50,7 @@ impl Directions {
             params.diffuse_count = self.diffuse as f32;
         }
         if let Some((index, count)) = direction {
-            // Scattered, every sample moves the same directions: its numbers are spread evenly over samples by themselves.
+            // Scattered, every sample moves the same directions: by what it moves them is spread over samples evenly.
             let index = if self.scatter { index % count.max(1) } else { index };
             let [x, y, z] = direction_around(index);
             params.around = [x, y, z, if self.scatter { std::f32::consts::TAU } else { self.turn }];

@@ -41,7 +41,7 @@ mod tests {
         let mut worst = 0.0f64;
         for i in 0..2_000_000u32 {
             // Every exponent up to some turns, and evenly over two turns.
-            let of_bits = f32::from_bits((i % 2 << 31) + i / 2 * 1097);
+            let of_bits = f32::from_bits(((i % 2) << 31) + i / 2 * 1097);
             let angle = if of_bits.abs() < 7.0 && i % 3 == 0 { of_bits } else { i as f32 * 6.3e-6 - 6.3 };
             let [[sine], [cosine]] = sin_cos([angle]);
             for (found, exact) in [(sine, f64::from(angle).sin()), (cosine, f64::from(angle).cos())] {

@@ -90,7 +90,9 @@ settings! {
         sun: Direction = Direction([0.4, 0.8, 0.45]), "--sun X,Y,Z", Rule::Any, "", Light, Usual;
         /// Angular diameter of the sun; 0 makes hard shadows.
         sun_angle: f64 = 0.53, "--sun-angle DEG", Rule::Real(0.0, 90.0), "degrees", Light, Usual;
-        /// Irradiance of the sun on a surface that faces it. [default: 2.4; with an image as environment 0]
+        /// Brightness of the sun: a white surface that faces it has the radiance 0.60, 0.56, 0.48 times this; with a
+        /// physical sky one as bright, while the sun is half way up. Its irradiance is pi times that. [default: 2.4;
+        /// with an image as environment 0]
         sun_intensity: Option<f64> = None, "--sun-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
         /// Radiance of the sky. It is the same in all directions, and without `ao` and `diffuse` it has no shadows.
         sky_intensity: f64 = 0.35, "--sky-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
@@ -500,7 +502,7 @@ impl Settings {
         self.workers.map_or(cores.min(4), |n| n as usize)
     }
 
-    /// The sun's irradiance: what was chosen, or what suits the environment.
+    /// The sun's brightness: what was chosen, or what suits the environment.
     pub fn sun_intensity(&self) -> f64 {
         let has_image = matches!(self.environment, Some(Environment::File(_)));
         self.sun_intensity.unwrap_or(if has_image { 0.0 } else { 2.4 })

@@ -2,6 +2,7 @@
 //! [`crate::math::sampling`].
 
 use crate::kernels::vector::{Vec3, cross, normalize};
+use crate::math::sines::sin_cos;
 use std::f32::consts::FRAC_PI_4;
 
 /// The kernel's literal, the f32 below the nearest to pi / 2.
@@ -14,12 +15,11 @@ pub fn disc_point(r: [f32; 2]) -> [f32; 2] {
     if p[0] == 0.0 && p[1] == 0.0 {
         return [0.0; 2];
     }
-    if p[0].abs() > p[1].abs() {
-        let a = FRAC_PI_4 * p[1] / p[0];
-        return [p[0] * a.cos(), p[0] * a.sin()];
-    }
-    let a = HALF_PI - FRAC_PI_4 * p[0] / p[1];
-    [p[1] * a.cos(), p[1] * a.sin()]
+    let is_along_x = p[0].abs() > p[1].abs();
+    let (radius, angle) =
+        if is_along_x { (p[0], FRAC_PI_4 * p[1] / p[0]) } else { (p[1], HALF_PI - FRAC_PI_4 * p[0] / p[1]) };
+    let [[sine], [cosine]] = sin_cos([angle]);
+    [radius * cosine, radius * sine]
 }
 
 /// A unit vector orthogonal to the unit vector n.

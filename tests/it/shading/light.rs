@@ -82,6 +82,19 @@ fn occlusion_by_a_wall_is_its_form_factor() {
     // Rays that end before the wall find nothing.
     let short = share("--ao-rays 4 --ao-length 0.9");
     assert!((short - 1.0).abs() < 1e-5, "{short}");
+    // Of few rays the mean is right, too, within three standard errors of 1024 that know nothing of each other.
+    let few = share("--ao-rays 1 --ao-length 400 --rotation full");
+    let error = (truth * (1.0 - truth) / 1024.0).sqrt();
+    assert!((few - truth).abs() < 3.0 * error, "{few} of the sky's light, not {truth}");
+    // Control: directions that are turned alone have four heights.
+    let turned = share("--ao-rays 1 --ao-length 400 --rotation 359");
+    assert!((turned - truth).abs() > 5.0 * error, "{turned}");
+    // The samples of a pixel are spread over the hemisphere: they err by less than chance.
+    let options = format!("{light} ao --spp 16 --ao-rays 1 --ao-length 400 --rotation full");
+    let pixels = render(&scene, &path, &options);
+    let squares: Vec<f32> = pixels.iter().map(|&x| (f64::from(x) / open - truth).powi(2) as f32).collect();
+    let by_chance = truth * (1.0 - truth) / 16.0;
+    assert!(mean(&squares) < 0.5 * by_chance, "{} of {by_chance}", mean(&squares));
 }
 
 const BOX: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n";

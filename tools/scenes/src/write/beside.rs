@@ -10,16 +10,16 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What the names of scene files end with, and those of their paths do not.
-const SCENE_EXTENSIONS: [&str; 3] = ["bricks", "glb", "gltf"];
+const SCENE_EXTENSIONS: [&str; 4] = ["bricks", "glb", "gltf", "ply"];
 
 #[derive(Serialize)]
 struct Motion {
     instances: Vec<Mover>,
 }
 
-/// Writes the paths of a scene beside it: for `base` = `dir/S.bricks`, `dir/S.glb`, `dir/S.gltf` or `dir/S` the files
-/// `dir/S.near.json` (a walk for 30 frames), `dir/S.near-300.json` (the same walk, longer, for 300 frames) and
-/// `dir/S.far.json`. Returns their names.
+/// Writes the paths of a scene beside it: for `base` = `dir/S.bricks`, `dir/S.glb`, `dir/S.gltf`, `dir/S.ply` or
+/// `dir/S` the files `dir/S.near.json` (a walk for 30 frames), `dir/S.near-300.json` (the same walk, longer, for 300
+/// frames) and `dir/S.far.json`. Returns their names.
 ///
 /// Each file appears complete or not at all.
 ///

@@ -1,4 +1,5 @@
-//! Files: scenes as glTF (`gltf`) and PLY (`ply`), their camera paths and motion (`beside`), each complete or not there (`output`).
+//! Files: scenes as glTF (`gltf`) and PLY (`ply`), their camera paths and motion (`beside`), each complete or not there
+//! (`output`).
 
 mod beside;
 mod gltf;
