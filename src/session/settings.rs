@@ -90,7 +90,7 @@ settings! {
         sun: Direction = Direction([0.4, 0.8, 0.45]), "--sun X,Y,Z", Rule::Any, "", Light, Usual;
         /// Angular diameter of the sun; 0 makes hard shadows.
         sun_angle: f64 = 0.53, "--sun-angle DEG", Rule::Real(0.0, 90.0), "degrees", Light, Usual;
-        /// Brightness of the sun: a white surface that faces it has the radiance 0.60, 0.56, 0.48 times this; with a
+        /// Brightness of the sun. A white surface that faces it has the radiance 0.60, 0.56, 0.48 times this; with a
         /// physical sky one as bright, while the sun is half way up. Its irradiance is pi times that. [default: 2.4;
         /// with an image as environment 0]
         sun_intensity: Option<f64> = None, "--sun-intensity X", Rule::Real(0.0, ANY), "", Light, Usual;
