@@ -5,9 +5,9 @@
     V/bin/python benches/peer/picture.py --scenes DIR [--turns 3] [--only city,plant,sponza] [--out target/picture]
 
 The picture: 640x360, 16 samples, a sun 0.53 degrees wide, a sky of radiance 1, one bounce, Lambertian surfaces of
-albedo 0.7. Scenes: a generated city and plant of 5M triangles, seen as their near paths begin, and Sponza without textures
-(DIR/sponza), view 3 of paths/. All read the same PLY. Every frame has a seed of its own. The first frame of a process
-loads bricks and builds trees, and is left out. A turn runs every program once; columns are medians over frames.
+albedo 0.7. Scenes: a generated city and plant of 5M triangles, seen as their near paths begin, and Sponza without
+textures (DIR/sponza), view 3 of paths/. All read the same PLY. Every frame has a seed of its own. The first frame of a
+process loads bricks and builds trees, and is left out. A turn runs every program once; columns are medians over frames.
 
 Noise is the variance of a pixel over its squared mean, from pairs of frames: `noise` is the mean over pixels, in which
 the frames' mean is held to 1e-3 from below. `work` is seconds times noise. Rows go to OUT/rows.jsonl.
@@ -15,6 +15,7 @@ On Debian bpy needs libxrender1 libxi6 libxxf86vm1 libxfixes3 libgl1 libxkbcommo
 """
 
 import argparse
+import importlib.util
 import json
 import math
 import pathlib
@@ -26,16 +27,26 @@ import sys
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def load(path):
+    """A program as a module, under a name that hides no package."""
+    spec = importlib.util.spec_from_file_location(f"{path.stem}_program", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+# The sun, and how glTF is read.
+REFERENCE = load(ROOT / "tools" / "mitsuba.py")
 SIZE = (640, 360)
 SAMPLES = 16
-SUN = (0.4, 0.8, 0.45)
+SUN = REFERENCE.SUN.tolist()
 SUN_DEGREES = 0.53
-# What a white surface that faces the sun reflects of it at intensity 1 (src/frame/light.rs).
-SUN_COLOR = (0.60, 0.56, 0.48)
 # So much irradiance of the sun, luminance.
 SUN_IRRADIANCE = 2.4
-SUN_INTENSITY = SUN_IRRADIANCE / math.pi / sum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), SUN_COLOR))
-IRRADIANCE = [math.pi * SUN_INTENSITY * c for c in SUN_COLOR]
+SUN_INTENSITY = SUN_IRRADIANCE / math.pi / sum(a * b for a, b in zip((0.2126, 0.7152, 0.0722), REFERENCE.SUN_COLOR))
+IRRADIANCE = [math.pi * SUN_INTENSITY * c for c in REFERENCE.SUN_COLOR.tolist()]
 ALBEDO = 0.7
 PROGRAMS = ("brickwalk", "brickwalk, 20 %", "Cycles", "Mitsuba")
 FRAMES = 3
@@ -170,50 +181,14 @@ def write_sponza(gltf, ply):
     """The triangles of a glTF file with a buffer of its own, placed, as PLY."""
     import numpy
 
-    words = json.loads(gltf.read_text())
-    buffers = [(gltf.parent / buffer["uri"]).read_bytes() for buffer in words["buffers"]]
-
-    def read(number):
-        accessor = words["accessors"][number]
-        view = words["bufferViews"][accessor["bufferView"]]
-        kind = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}[accessor["componentType"]]
-        width = {"SCALAR": 1, "VEC3": 3}[accessor["type"]]
-        item = numpy.dtype(kind).itemsize * width
-        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        shape, strides = (accessor["count"], item), (view.get("byteStride", item), 1)
-        raw = numpy.frombuffer(buffers[view["buffer"]], "u1", offset=start)
-        rows = numpy.lib.stride_tricks.as_strided(raw, shape, strides)
-        return numpy.ascontiguousarray(rows).view(kind).reshape(accessor["count"], width)
-
-    points, faces, count = [], [], 0
-
-    def visit(number, above):
-        nonlocal count
-        node = words["nodes"][number]
-        own = numpy.identity(4)
-        if "matrix" in node:
-            own = numpy.array(node["matrix"]).reshape(4, 4).T
-        elif {"rotation", "scale", "translation"} & node.keys():
-            x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-            turn = numpy.array([
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ])
-            own[:3, :3] = turn * numpy.array(node.get("scale", (1, 1, 1)))
-            own[:3, 3] = node.get("translation", (0, 0, 0))
-        world = above @ own
-        for part in words["meshes"][node["mesh"]]["primitives"] if "mesh" in node else ():
-            positions = read(part["attributes"]["POSITION"])
-            points.append(positions @ world[:3, :3].T + world[:3, 3])
-            faces.append(read(part["indices"]).reshape(-1, 3).astype("<u4") + count)
-            count += len(positions)
-        for child in node.get("children", ()):
-            visit(child, world)
-
-    for root in words["scenes"][words.get("scene", 0)]["nodes"]:
-        visit(root, numpy.identity(4))
-    points, corners = numpy.concatenate(points).astype("<f4"), numpy.concatenate(faces)
+    document = json.loads(gltf.read_text())
+    data = (gltf.parent / document["buffers"][0]["uri"]).read_bytes()
+    points, corners, count = [], [], 0
+    for positions, indices, _ in REFERENCE.meshes(document, data):
+        points.append(positions)
+        corners.append(indices.astype("<u4") + count)
+        count += len(positions)
+    points, corners = numpy.concatenate(points).astype("<f4"), numpy.concatenate(corners)
     faces = numpy.empty(len(corners), [("count", "u1"), ("corners", "<u4", 3)])
     faces["count"], faces["corners"] = 3, corners
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
