@@ -1,4 +1,4 @@
-// One ray from every primary hit in the pass's direction around the interpolated normal, turned about it at random
+// One ray from every hit of the shaded set in the pass's direction around the interpolated normal, turned about it at random
 // within limits (CHC+RT §5.3), or, scattered, moved over the whole hemisphere by a random step in the two numbers that
 // it comes from (Cranley and Patterson 1976: the turn, and the square of the sine); where that leads below the surface,
 // none. Limited rays ask for occlusion; for the others the throughput is noted: what of light from around the surface
@@ -11,6 +11,20 @@
 #include "shade/lamps.wgsl"
 #include "shade/light.wgsl"
 #include "shade/gloss.wgsl"
+
+// By which the direction is moved.
+fn moved_by(index: u32) -> vec2<f32> {
+    let pixel = pixel_of(index);
+    if (params.flags & PARAM_BOUNCE) != 0u {
+        // Of their own in every direction that their paths begin with.
+        return points2(pixel ^ pcg(origins[index].direction + 1u), params.stream, params.seed);
+    }
+    if (params.flags & PARAM_SCATTER) != 0u {
+        let block = pixel / params.width / 8u * ((params.width + 7u) / 8u) + pixel % params.width / 8u;
+        return points2_near(pixel, block, params.stream, params.seed, params.strata);
+    }
+    return points2(pixel, params.stream, params.seed);
+}
 
 override LIMITED: bool = false;
 
@@ -26,7 +40,7 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
     var carried = vec3<f32>(0.0);
     if surface.leaf != NONE {
         let g = gbuffer[index];
-        let r = points2(pixel_of(index), params.stream, params.seed);
+        let r = moved_by(index);
         let angle = params.around.w * r.x;
         let c = cos(angle);
         let s = sin(angle);

@@ -2,7 +2,7 @@
 
 use super::{Answers, Budgeted, Captures, Effects, Light, Moved};
 use crate::counters::Counters;
-use crate::kernels::{FrameExecutor, Lod};
+use crate::kernels::{FrameExecutor, Lod, reflectance};
 use crate::schedule::auto::Auto;
 use crate::schedule::cache::Cache;
 #[cfg(feature = "lab")]
@@ -132,6 +132,25 @@ impl Engine {
     /// Whether rays lead to the environment.
     pub fn draws_environment(&self) -> bool {
         self.settings.effects.environment && self.light.lamps.environment.is_some()
+    }
+
+    /// Whether rays lead to the environment and share its light with rays that surfaces draw. An even one is brought in
+    /// one way alone: by what surfaces draw, where they do.
+    pub fn shares_environment(&self) -> bool {
+        self.draws_environment() && !self.light.lamps.environment.as_ref().is_some_and(|own| own.is_even)
+    }
+
+    /// Whether the rays to the environment of `pass` bring anything.
+    pub fn draws_environment_in(&self, pass: Pass) -> bool {
+        let effects = &self.settings.effects;
+        let brings = match pass {
+            Pass::PathShadow(_) => false,
+            Pass::Shadow(_) if effects.diffuse.is_some() => {
+                !effects.glossy && reflectance::is_needed(self.scene.resident())
+            }
+            _ => true,
+        };
+        self.draws_environment() && (brings || self.shares_environment())
     }
 
     /// Notes who answered the rays of a pass that has just been traced, where that is asked for.

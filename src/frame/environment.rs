@@ -10,6 +10,9 @@ pub const MOST_WIDTH: u32 = 2048;
 /// Its rows.
 pub const MOST_HEIGHT: u32 = 1024;
 
+/// Environments of less [`unevenness`] are even.
+const EVEN: f64 = 2.0;
+
 /// Linear radiance from all directions: rows from +Y down, the middle of a row along -Z, its right along +X.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Equirectangular {
@@ -129,7 +132,21 @@ pub fn environment(mut image: Equirectangular, intensity: f64, turn_degrees: f64
     });
     let ambient = ambient(lights).map(|color| color.map(|c| c.clamp(f32::MIN.into(), f32::MAX.into()) as f32));
     let (texels, table) = drawn(&image);
-    (Environment { width: image.width, height: image.height, texels, table, turn, ambient }, notes)
+    let is_even = unevenness(&image) < EVEN;
+    (Environment { width: image.width, height: image.height, texels, table, turn, ambient, is_even }, notes)
+}
+
+/// The mean of the squared luminance over all directions, over the square of its mean: 1 of a sky that is the same
+/// everywhere, many thousands of one with a sun. Of a black sky 1.
+fn unevenness(image: &Equirectangular) -> f64 {
+    let (mut sum, mut squares, mut all) = (0.0, 0.0, 0.0);
+    for (row, texels) in (0..).zip(image.texels.chunks(image.width as usize)) {
+        let angle = zone(row, image.height) / f64::from(image.width);
+        for light in texels.iter().map(|texel| luminance(texel.map(f64::from))) {
+            (sum, squares, all) = (sum + light * angle, squares + light * light * angle, all + angle);
+        }
+    }
+    if sum > 0.0 { squares * all / (sum * sum) } else { 1.0 }
 }
 
 /// What a white surface reflects of `lights`, each a unit direction and a radiance times a solid angle: the factors of
@@ -197,6 +214,23 @@ mod tests {
     fn noise(width: u32, height: u32) -> Equirectangular {
         let texels = (0..width * height).map(|i| [0, 1, 2].map(|k| pcg(3 * i + k) as f32 / 1e9)).collect();
         Equirectangular { width, height, texels }
+    }
+
+    #[test]
+    fn unevenness_is_that_of_the_luminance() {
+        // Of 1 + a y: 1 + a^2 / 3, as y^2 is 1/3 on average.
+        let tilted = |a: f64| Equirectangular::of(64, 32, |[_, y, _]| [1.0 + a * y; 3]);
+        for a in [0.0, 0.5, 1.0] {
+            let (found, exact) = (unevenness(&tilted(a)), 1.0 + a * a / 3.0);
+            assert!((found / exact - 1.0).abs() < 2e-3, "{a}: {found}");
+        }
+        // Light from a share of all directions alone: the inverse of the share. Turned and brighter it is the same.
+        let half = Equirectangular::of(64, 32, |[_, y, _]| [f64::from(y > 0.0) * 7.0; 3]);
+        assert!((unevenness(&half) - 2.0).abs() < 1e-9);
+        let is_even = |image: Equirectangular| environment(image, 3.0, 70.0).0.is_even;
+        assert!(is_even(tilted(1.0)) && is_even(Equirectangular::of(8, 4, |_| [0.0; 3])));
+        let sun = Equirectangular::of(64, 32, |[_, y, _]| [if y > 0.98 { 1e4 } else { 1.0 }; 3]);
+        assert!(unevenness(&sun) > 20.0 && !is_even(sun));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::bands::Joint;
 use super::correct::correct;
 use super::engine::RenderSettings;
 use super::half_rate;
-use super::noise::{LEAST, Noise};
+use super::noise::{LEAST, Noise, ROUND};
 use super::{
     Accumulation, BATCH_SAMPLES, Effects, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState,
     Pixels, camera_view,
@@ -224,6 +224,8 @@ impl Band<'_> {
         let mut noise = engine.settings.noise.map(|target| Noise::new(target, rows));
         // So many samples stand for a pixel when textures are looked up.
         let shares = if noise.is_some() { LEAST } else { engine.settings.samples };
+        // Where noise is judged, and at the end, pixels have all strata.
+        let strata = (engine.settings.samples | ROUND).trailing_zeros();
         let mut guides = engine.settings.guides.then(|| GuideReader::new(camera, engine.size, &engine.moved));
         for sample in 0..engine.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
@@ -246,9 +248,10 @@ impl Band<'_> {
             }
             // Each sample stands for its share of the pixel: textures are looked up by that.
             view.params.step_y[3] /= (shares as f32).sqrt();
+            view.params.strata = strata;
             if engine.settings.taa {
                 let [x, y] = pixel_jitter(frame, sample, engine.settings.samples);
-                view.params.jitter = [x, y, 0.0, 0.0];
+                view.params.jitter = [x, y];
             }
             engine.executor.begin_frame(&view);
             methods.iter_mut().for_each(|method| method.begin(camera, &view));
@@ -374,7 +377,7 @@ fn bounces(
             r.trace(frame, Pass::Path(number), [&[], &[]], stats)?;
             rays = stats.rays_traced - before;
             r.resolve(Pass::Path(number), stats)?;
-            let (shadow, environment) = (r.settings.effects.shadow, r.draws_environment());
+            let (shadow, environment) = (r.settings.effects.shadow, r.shares_environment());
             // What lamps bring to the hits before is weighted where these rays meet it.
             let shading =
                 Shading { sun: is_lit && !shadow, sky: false, emission: true, miss: true, environment, gloss: true };
@@ -412,7 +415,7 @@ fn bounce(
             r.note_answers(pass, true)?;
             lit = Some(plan.light);
             // What is met shows nothing by itself.
-            let shading = Shading { miss: true, environment: draws, ..Shading::default() };
+            let shading = Shading { miss: true, environment: r.shares_environment(), ..Shading::default() };
             return r.shade(of_lamp(Lamp::Sun), shading, stats);
         }
         r.trace(frame, pass, [&plan.first(), &[]], stats)?;
@@ -425,7 +428,7 @@ fn bounce(
             sky: !is_diffuse && !draws && !goes_on,
             emission: !is_diffuse || !r.light.lamps.has_surfaces(),
             miss: true,
-            environment: draws,
+            environment: r.shares_environment(),
             gloss: pass == Pass::Glossy,
         };
         r.shade(of_lamp(Lamp::Sun), shading, stats)
@@ -477,9 +480,9 @@ fn light_environment(
     name: &'static str,
     of_lamp: impl Fn(Lamp) -> Pass,
 ) -> Result<(), ExecutorError> {
-    if engine.draws_environment() {
+    let pass = of_lamp(Lamp::Environment);
+    if engine.draws_environment_in(pass) {
         let frame = records.frame();
-        let pass = of_lamp(Lamp::Environment);
         records.pass(engine, name, |r, stats| trace_and_add(r, methods, frame, pass, stats))?;
     }
     Ok(())

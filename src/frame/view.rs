@@ -44,7 +44,7 @@ pub fn camera_view(
         sun_color: color(light.sun_color),
         sky_color: color(light.sky_color),
         ground_color: color(light.ground_color),
-        jitter: [jx, jy, 0.0, 0.0],
+        jitter: [jx, jy],
         emitter_count: light.lamps.emitters().len() as u32,
         emitter_density: (light.lamps.density_of_surfaces() * frame.unit * frame.unit) as f32,
         sample,
@@ -68,6 +68,7 @@ pub fn camera_view(
         glossy: effects.glossy,
         refracts: effects.refracts(),
         shares: effects.environment && light.lamps.environment.is_some() && effects.diffuse.is_some(),
+        even: light.lamps.environment.as_ref().is_some_and(|environment| environment.is_even),
     };
     View { frame, params, directions, rays: None }
 }

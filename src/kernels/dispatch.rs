@@ -9,10 +9,19 @@ use crate::schedule::{Lamp, Over, Own, Pass, Query, Step};
 /// Direction `index` about z of passes that start at hits, before it is turned or scattered.
 pub fn direction_around(index: u32) -> [f32; 3] {
     // The first point of the sequence is a corner of the square.
-    cosine_hemisphere([halton(index + 1, 0), halton(index + 1, 1)])
+    around(index + 1)
+}
+
+fn around(index: u32) -> [f32; 3] {
+    cosine_hemisphere([halton(index, 0), halton(index, 1)])
 }
 
 impl Directions {
+    /// Whether the rays of `pass` lead to an environment in directions around the normal.
+    fn is_around(&self, pass: Pass) -> bool {
+        self.even && pass.lamp() == Some(Lamp::Environment)
+    }
+
     /// The parameters of `pass`.
     fn params(&self, pass: Pass, params: &Params) -> Params {
         // Every kind of pass takes random numbers of its own. Those of a sun alone depend on the sample only.
@@ -27,10 +36,10 @@ impl Directions {
             Pass::Diffuse(index) => (5, Some((index, self.diffuse))),
             Pass::Glossy | Pass::Path(_) => (8, None),
         };
-        let lamp = match pass {
-            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => Some(lamp),
-            _ => None,
-        };
+        let (lamp, is_around) = (pass.lamp(), self.is_around(pass));
+        // One direction, which every sample moves.
+        let direction = if is_around { Some((0, 1)) } else { direction };
+        let scatter = self.scatter || is_around;
         let flag = |set: bool, flag: u32| if set { flag } else { 0 };
         let mut params = Params {
             flags: params.flags
@@ -42,7 +51,7 @@ impl Directions {
                 | flag(self.glossy, layout::PARAM_GLOSSY)
                 | flag(self.refracts, layout::PARAM_REFRACT),
             stream: params.sample.wrapping_add(stream << 24),
-            length: self.occlusion_length,
+            length: if is_around { layout::T_INFINITE } else { self.occlusion_length },
             levels: self.lod.params(pass, params.sun_radius),
             ..*params
         };
@@ -51,10 +60,11 @@ impl Directions {
         }
         if let Some((index, count)) = direction {
             // Scattered, every sample moves the same directions: by what it moves them is spread over samples evenly.
-            let index = if self.scatter { index % count.max(1) } else { index };
-            let [x, y, z] = direction_around(index);
-            params.around = [x, y, z, if self.scatter { std::f32::consts::TAU } else { self.turn }];
-            params.flags |= flag(self.scatter, layout::PARAM_SCATTER);
+            let index = if scatter { index % count.max(1) } else { index };
+            // Where directions are moved all the way round, the first is where they start.
+            let [x, y, z] = if scatter { around(index) } else { direction_around(index) };
+            params.around = [x, y, z, if scatter { std::f32::consts::TAU } else { self.turn }];
+            params.flags |= flag(scatter, layout::PARAM_SCATTER);
             params.share = 1.0 / count.max(1) as f32;
             params.direction = index;
         }
@@ -162,6 +172,7 @@ pub fn dispatches(pass: Pass, step: Step, params: &Params, directions: &Directio
                 Pass::Occlusion(_) => kernels::generate_occlusion,
                 Pass::Diffuse(_) => kernels::generate_diffuse,
                 Pass::Glossy => kernels::generate_glossy,
+                _ if directions.is_around(pass) => kernels::generate_occlusion,
                 // Paths go on by a step of their own.
                 _ => kernels::generate_shadow,
             };

@@ -22,6 +22,8 @@ pub struct Environment {
     pub turn: f64,
     /// What a white surface reflects of it, by terms of its normal: `ambient` in `shaders/shade/light.wgsl`.
     pub ambient: [[f32; 3]; 9],
+    /// It is about as bright in all directions: they are drawn by the cosine at the surface, not by its light.
+    pub is_even: bool,
 }
 
 /// All lamps beside the sun.

@@ -114,8 +114,10 @@ pub struct Directions {
     pub glossy: bool,
     /// Bodies that refract bend light.
     pub refracts: bool,
-    /// Diffuse rays bring the environment's light as well as rays to it.
+    /// Diffuse rays bring the environment's light as well as rays to it; of an even one, they alone.
     pub shares: bool,
+    /// Directions to the environment are drawn by the cosine alone.
+    pub even: bool,
     /// What levels of detail are selected by.
     pub lod: Lod,
 }

@@ -196,7 +196,7 @@ kernels! {
     generate_shadow: "shade/generate_shadow" Shading []
         |b, t| generate_shadow(b, t.own, t.seen, &t.pixels.origins);
     generate_occlusion: "shade/generate_around" Shading [LIMITED = 1]
-        |b, t| generate_occlusion(b, t.own, t.seen, &t.pixels.gbuffers[t.shaded]);
+        |b, t| generate_occlusion(b, t.own, t.seen, &t.pixels.gbuffers[t.shaded], &t.pixels.origins);
     generate_diffuse: "shade/generate_around" Shading [LIMITED = 0]
         |b, t| generate_diffuse(b, t.own, t.seen, t.pixels, t.materials);
     generate_glossy: "shade/generate_glossy" Shading []

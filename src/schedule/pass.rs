@@ -49,6 +49,14 @@ impl Pass {
         self.set() < 2 && !matches!(self, Pass::Path(_))
     }
 
+    /// The lamp that its rays lead to.
+    pub fn lamp(self) -> Option<Lamp> {
+        match self {
+            Pass::Shadow(lamp) | Pass::BounceShadow(lamp) | Pass::PathShadow(lamp) => Some(lamp),
+            _ => None,
+        }
+    }
+
     /// Whether any hit ends a ray.
     pub fn is_any_hit(self) -> bool {
         matches!(self, Pass::Shadow(_) | Pass::Occlusion(_) | Pass::BounceShadow(_) | Pass::PathShadow(_))
@@ -58,9 +66,7 @@ impl Pass {
     /// rays share one (CHC+RT §5.4), but for those to the environment, which go everywhere.
     pub fn visibility_state(self) -> Pass {
         match self {
-            Pass::Shadow(Lamp::Environment)
-            | Pass::BounceShadow(Lamp::Environment)
-            | Pass::PathShadow(Lamp::Environment) => self,
+            own if own.lamp() == Some(Lamp::Environment) => self,
             Pass::Shadow(_) => Pass::Shadow(Lamp::Sun),
             Pass::BounceShadow(_) => Pass::BounceShadow(Lamp::Sun),
             Pass::PathShadow(_) => Pass::PathShadow(Lamp::Sun),

@@ -3,22 +3,22 @@
 
 use super::choose::{ChooseDirection, Chosen, choose_emitter};
 use super::cones::{self, widen};
+use super::directions::{Around, Column, OfDisc, RUN};
 use super::gloss::{Drawn, Gloss, left_within};
 use super::lamps::{lamp_words, shines};
 use super::more::Shown;
-use super::random::{disc_point, tangent};
+use super::random::tangent;
 use super::shade::Pixels;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{
     EMITTER_DISTANT, EMITTER_KIND, EMITTER_TRIANGLE, Emitter, GBuffer, NONE, Origin, PARAM_EMITTER, PARAM_ENVIRONMENT,
-    PARAM_SCATTER, Params, Ray, Surface, T_INFINITE, UNSHARED,
+    Params, Ray, Surface, T_INFINITE, UNSHARED,
 };
 use crate::kernels::rays::{RaySet, start_hit};
 use crate::kernels::simd::isa::Best;
 use crate::kernels::vector::{Vec3, cross, dot, each, most, most3, normalize, xyz};
 use crate::math::exact::barrier;
 use crate::math::sampling::{pcg, points2, points4};
-use crate::math::sines::sin_cos;
 use bricks::Material;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -30,16 +30,29 @@ const SHORT_OF_LIGHT: f32 = 1.0 / 65_536.0;
 /// instances.
 const BESIDE: f32 = 1.0 / 1_048_576.0;
 
-/// Makes every ray of `own`, with the triangle that it starts from and the emitter that it leads to.
-fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32, Chosen) + Sync) {
+/// Makes every ray of `own`, with the triangle that it starts from and the emitter that it leads to: by what `of_run`
+/// gives for the rays from a number on, the place in the run, and the ray's number.
+fn for_each_in_runs<T>(
+    own: &mut RaySet,
+    of_run: impl Fn(usize) -> T + Sync,
+    make: impl Fn(&T, usize, usize) -> (Ray, u32, Chosen) + Sync,
+) {
     let RaySet { rays, hits, surfaces } = own;
-    let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
-    all.enumerate().with_min_len(1024).for_each(|(index, ((ray, hit), surface))| {
-        let (source, chosen);
-        (*ray, source, chosen) = make(index);
-        (*hit, *surface) = start_hit(ray.t_max, source);
-        (surface.emitter, surface.area) = (chosen.emitter, chosen.probability);
+    let runs = rays.par_chunks_mut(RUN).zip(hits.par_chunks_mut(RUN)).zip(surfaces.par_chunks_mut(RUN));
+    runs.enumerate().with_min_len(1024 / RUN).for_each(|(run, ((rays, hits), surfaces))| {
+        let shared = of_run(run * RUN);
+        for (k, ((ray, hit), surface)) in rays.iter_mut().zip(hits).zip(surfaces).enumerate() {
+            let (source, chosen);
+            (*ray, source, chosen) = make(&shared, k, run * RUN + k);
+            (*hit, *surface) = start_hit(ray.t_max, source);
+            (surface.emitter, surface.area) = (chosen.emitter, chosen.probability);
+        }
     });
+}
+
+/// The same of rays that share nothing.
+fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32, Chosen) + Sync) {
+    for_each_in_runs(own, |_| (), |(), _, index| make(index));
 }
 
 /// Starts the hits of rays that came from outside: nothing found within their range.
@@ -112,12 +125,15 @@ fn toward(e: &Emitter, start: Vec3, r: [f32; 2]) -> Vec3 {
 pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, origins: &[Origin]) {
     let p = bound.params;
     let (sun, best) = (xyz(p.sun), Best::detect());
-    for_each_new(own, |index| {
+    let draws = bound.has(PARAM_EMITTER) || bound.has(PARAM_ENVIRONMENT);
+    let x = tangent(sun);
+    let y = cross(sun, x);
+    let of_run = |first| (!draws && p.sun_radius > 0.0).then(|| best.run(OfDisc { bound, first, origins }));
+    for_each_in_runs(own, of_run, |disc, k, index| {
         let surface = &seen.surfaces[index];
         let mut ray = Ray { origin: surface.point, t_min: 1.0, direction: sun, t_max: 0.0 };
         let mut chosen = Chosen::default();
         if surface.leaf != NONE {
-            let r = points2(bound.pixel_of(index, origins), p.stream, p.seed);
             let mut faces = true;
             let mut t_max = T_INFINITE;
             if bound.has(PARAM_EMITTER) {
@@ -128,6 +144,7 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, origins: 
                 faces = chosen.emitter != NONE;
                 if faces {
                     let e = &emitters[chosen.emitter as usize];
+                    let r = points2(bound.pixel_of(index, origins), p.stream, p.seed);
                     ray.direction = toward(e, surface.point, r);
                     faces = shines(e, ray.direction) > 0.0;
                     t_max = if e.kind & EMITTER_KIND == EMITTER_DISTANT { T_INFINITE } else { 1.0 - SHORT_OF_LIGHT };
@@ -135,10 +152,8 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, origins: 
             } else if bound.has(PARAM_ENVIRONMENT) {
                 (chosen, ray.direction) = best.run(ChooseDirection { bound, index, origins, normal: surface.normal });
                 faces = chosen.probability > 0.0;
-            } else if p.sun_radius > 0.0 {
-                let disc = disc_point(r).map(|x| x * p.sun_radius);
-                let x = tangent(sun);
-                let y = cross(sun, x);
+            } else if let Some(disc) = disc {
+                let disc = [disc[0][k], disc[1][k]].map(|x| x * p.sun_radius);
                 let across = |k: usize| barrier(barrier(x[k] * disc[0]) + barrier(y[k] * disc[1]));
                 ray.direction = each(|k| barrier(sun[k] + across(k)));
             }
@@ -151,24 +166,13 @@ pub fn generate_shadow(bound: &Bound, own: &mut RaySet, seen: &RaySet, origins: 
     });
 }
 
-/// The pass's direction around the normal, turned about it at random within limits, or scattered over the hemisphere.
-fn turned(bound: &Bound, index: usize, normal: Vec3) -> Vec3 {
-    let p = bound.params;
-    let mut a = p.around;
-    let r = points2(bound.pixel_of(index, &[]), p.stream, p.seed);
-    let angle = a[3] * r[0];
-    let [[s], [c]] = sin_cos([angle]);
-    let x = tangent(normal);
-    let y = cross(normal, x);
-    if bound.has(PARAM_SCATTER) {
-        // The same bits everywhere: near 1 the height of the direction is sensitive to them.
-        let squared = barrier(barrier(a[0] * a[0]) + barrier(a[1] * a[1]));
-        let moved = barrier(squared + r[1]).fract();
-        let scale = (moved / most(squared, 1e-6)).sqrt();
-        a = [scale * a[0], scale * a[1], (1.0 - moved).sqrt(), a[3]];
+/// Directions around the normals of the hits of a run; see [`Around`].
+fn directions_around(bound: &Bound, first: usize, gbuffer: &[GBuffer], origins: &[Origin]) -> [Column; 3] {
+    let mut normals = [[0.0; RUN]; 3];
+    for (k, g) in gbuffer[first..].iter().take(RUN).enumerate() {
+        (0..3).for_each(|axis| normals[axis][k] = g.normal[axis]);
     }
-    let turned = [c * a[0] - s * a[1], s * a[0] + c * a[1], a[2]];
-    normalize(each(|k| turned[0] * x[k] + turned[1] * y[k] + turned[2] * normal[k]))
+    Best::detect().run(Around { bound, first, origins, normals })
 }
 
 /// A ray from a hit in `direction`, up to `t_max`; none where that leads below the surface.
@@ -192,21 +196,34 @@ pub fn for_each_leaving(own: &mut RaySet, seen: &RaySet, make: impl Fn(usize, &S
     });
 }
 
+/// Rays of at most such a length from the hits of the shaded set, in directions around their normals.
+fn leave_around(
+    bound: &Bound,
+    own: &mut RaySet,
+    seen: &RaySet,
+    (gbuffer, origins): (&[GBuffer], &[Origin]),
+    length: f32,
+) {
+    let of_run = |first| directions_around(bound, first, gbuffer, origins);
+    for_each_in_runs(own, of_run, |[x, y, z], k, index| {
+        let surface = &seen.surfaces[index];
+        let is_hit = surface.leaf != NONE;
+        let ray = if is_hit { leaving(surface, [x[k], y[k], z[k]], length) } else { none(surface.point) };
+        (ray, seen.hits[index].id, Chosen::default())
+    });
+}
+
 /// One ray of limited length from every primary hit in the pass's direction around the interpolated normal (CHC+RT
 /// §5.3); where that leads below the surface, none.
-pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer]) {
-    for_each_leaving(own, seen, |index, surface| {
-        leaving(surface, turned(bound, index, gbuffer[index].normal), bound.params.length)
-    });
+pub fn generate_occlusion(bound: &Bound, own: &mut RaySet, seen: &RaySet, gbuffer: &[GBuffer], origins: &[Origin]) {
+    leave_around(bound, own, seen, (gbuffer, origins), bound.params.length);
 }
 
 /// As [`generate_occlusion`], of unlimited length. The throughput is noted: what of light from around the surface
 /// reflects, by the share of the direction; in w the density of the direction.
 pub fn generate_diffuse(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &mut Pixels, materials: &[Material]) {
     let Pixels { gbuffers: [gbuffer, _], mores: [mores, _], throughput, origins, .. } = pixels;
-    for_each_leaving(own, seen, |index, surface| {
-        leaving(surface, turned(bound, index, gbuffer[index].normal), T_INFINITE)
-    });
+    leave_around(bound, own, seen, (gbuffer, &[]), T_INFINITE);
     let carried = throughput.par_iter_mut().zip(origins.par_iter_mut());
     carried.enumerate().with_min_len(1024).for_each(|(index, (carried, origin))| {
         let ray = &own.rays[index];

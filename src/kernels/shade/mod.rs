@@ -3,6 +3,7 @@
 pub mod choose;
 pub mod clip_rays;
 pub mod cones;
+mod directions;
 mod film;
 pub mod generate;
 pub mod gloss;

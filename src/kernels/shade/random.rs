@@ -9,20 +9,26 @@ use std::f32::consts::FRAC_PI_4;
 #[expect(clippy::approx_constant, reason = "the next f32 is nearer, and it is not the kernel's")]
 const HALF_PI: f32 = 1.570_796_3;
 
-/// Shirley and Chiu's concentric map of the unit square to the unit disc.
-pub fn disc_point(r: [f32; 2]) -> [f32; 2] {
-    let p = r.map(|x| 2.0 * x - 1.0);
-    if p[0] == 0.0 && p[1] == 0.0 {
-        return [0.0; 2];
+/// Shirley and Chiu's concentric map of the unit square to the unit disc, of several points, number by number.
+#[inline(always)]
+pub fn disc_points<const N: usize>(r: [[f32; N]; 2]) -> [[f32; N]; 2] {
+    let p = r.map(|r| r.map(|x| 2.0 * x - 1.0));
+    let (mut radius, mut angle) = ([0.0; N], [0.0; N]);
+    for k in 0..N {
+        let (x, y) = (p[0][k], p[1][k]);
+        let is_along_x = x.abs() > y.abs();
+        let (along, across) = if is_along_x { (x, y) } else { (y, x) };
+        let turn = FRAC_PI_4 * across / along;
+        radius[k] = along;
+        angle[k] = if is_along_x { turn } else { HALF_PI - turn };
     }
-    let is_along_x = p[0].abs() > p[1].abs();
-    let (radius, angle) =
-        if is_along_x { (p[0], FRAC_PI_4 * p[1] / p[0]) } else { (p[1], HALF_PI - FRAC_PI_4 * p[0] / p[1]) };
-    let [[sine], [cosine]] = sin_cos([angle]);
-    [radius * cosine, radius * sine]
+    let [sines, cosines] = sin_cos(angle);
+    let scaled = |by: [f32; N]| std::array::from_fn(|k| if radius[k] == 0.0 { 0.0 } else { radius[k] * by[k] });
+    [scaled(cosines), scaled(sines)]
 }
 
 /// A unit vector orthogonal to the unit vector n.
+#[inline(always)]
 pub fn tangent(n: Vec3) -> Vec3 {
     let axis = if n[0].abs() > 0.7 { [0.0, 1.0, 0.0] } else { [1.0, 0.0, 0.0] };
     normalize(cross(n, axis))

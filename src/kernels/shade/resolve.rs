@@ -121,13 +121,16 @@ fn read(
     let is_stretched = place.flags & INSTANCE_STRETCHED != 0;
     let m = &place.object_from_world;
     let turned = |n: Vec3| each(|k| m[0][k] * n[0] + m[1][k] * n[1] + m[2][k] * n[2]);
-    let mut normals = [[0.0; 3]; 3];
-    for ((weight, v), own) in weights.into_iter().zip(&corners).zip(&mut normals) {
-        let (mut n, c) = (octahedral(v.normal), unpack4x8unorm(v.color));
-        if is_stretched {
-            n = unit_or_zero(turned(n));
-        }
-        *own = n;
+    let unpacked = |word: u32| {
+        let n = octahedral(word);
+        if is_stretched { unit_or_zero(turned(n)) } else { n }
+    };
+    // Most triangles are flat, and white.
+    let is_flat = corners.iter().all(|v| v.normal == corners[0].normal);
+    let normals = if is_flat { [unpacked(corners[0].normal); 3] } else { corners.map(|v| unpacked(v.normal)) };
+    let is_white = corners.iter().all(|v| v.color == u32::MAX);
+    for ((weight, v), n) in weights.into_iter().zip(&corners).zip(&normals) {
+        let c = if is_white { [1.0; 4] } else { unpack4x8unorm(v.color) };
         normal = each(|k| normal[k] + weight * n[k]);
         uv = [0, 1].map(|k| uv[k] + weight * v.uv[k]);
         color = [0, 1, 2, 3].map(|k| color[k] + weight * c[k]);
@@ -156,7 +159,7 @@ fn read(
         occlusion: 1.0,
         metallic: material.metallic,
         roughness: material.roughness,
-        curvature: curvature_of(normals, surface.area),
+        curvature: if is_flat { 0.0 } else { curvature_of(normals, surface.area) },
         ..GBuffer::default()
     };
     for (place, texture) in (0..).zip(material.textures()) {

@@ -3,7 +3,8 @@
 
 use super::gloss::Gloss;
 use super::lamps::{
-    drawn_density, drawn_light, environment_density, environment_sample, lamp_words, outweighs, shines, sun_density,
+    drawn_density, drawn_light, environment_at, environment_density, environment_sample, lamp_words, outweighs, shines,
+    sun_density,
 };
 use super::light::{add_light as add, ambient, background, sunlight};
 use super::more::Shown;
@@ -11,7 +12,7 @@ use crate::kernels::bound::{Bound, Tally, atomic};
 use crate::kernels::layout::{
     BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBUFFER_BACK, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT,
     MET, More, NONE, Origin, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS,
-    PARAM_PATH, PARAM_SKY, PARAM_SUN, Ray,
+    PARAM_PATH, PARAM_SCATTER, PARAM_SKY, PARAM_SUN, Ray,
 };
 use crate::kernels::rays::RaySet;
 use crate::kernels::vector::{Vec3, cross, dot, each, most, normalize, xyz};
@@ -223,7 +224,7 @@ pub fn shade(bound: &Bound, pixels: &mut Pixels, shaded: usize, seen: &RaySet, m
 
 /// Adds the light of the pass's lamp to the hits of the shaded set, those of `seen`, whose shadow ray went free. The
 /// environment shares a direction with diffuse rays, what is not diffuse with the rays that surfaces draw by their
-/// gloss, and all light with rays by which paths go on.
+/// gloss, and all light with rays by which paths go on. Of an even environment rays to it bring what none of these do.
 pub fn add_light(
     bound: &Bound,
     pixels: &mut Pixels,
@@ -231,6 +232,9 @@ pub fn add_light(
     (seen, own): (&RaySet, &RaySet),
     materials: &[Material],
 ) {
+    let is_around = bound.has(PARAM_ENVIRONMENT) && bound.has(PARAM_SCATTER);
+    let shares = |flag: bool| flag && !bound.has(PARAM_BOUNCE);
+    let (by_diffuse, by_gloss) = (shares(bound.params.diffuse_count > 0.0), shares(bound.has(PARAM_GLOSSY)));
     for_each_hit(bound, pixels, shaded, |index, g, (_, origins)| {
         let ray = &own.rays[index];
         if !is_traced(ray) || own.hits[index].id != NONE {
@@ -255,6 +259,8 @@ pub fn add_light(
                 density = e.probability * squared * squared.sqrt() / shone;
             }
             each(|k| e.radiance[k] * cosine * shone / (PI * squared * squared) / chosen.area)
+        } else if is_around {
+            environment_at(bound, d)
         } else if bound.has(PARAM_ENVIRONMENT) {
             let chosen = &own.surfaces[index];
             let drawn = environment_sample(bound, lamp_words(bound, index, chosen.emitter, origins));
@@ -268,14 +274,15 @@ pub fn add_light(
         };
         let s = Gloss::of(g, &materials[g.material as usize], seen.rays[index].direction.map(|x| -x));
         let mut reflects = s.diffuse;
-        if bound.has(PARAM_ENVIRONMENT) && !bound.has(PARAM_BOUNCE) && bound.params.diffuse_count > 0.0 {
-            let share = outweighs(density, bound.params.diffuse_count * cosine / PI);
+        if bound.has(PARAM_ENVIRONMENT) && by_diffuse {
+            let by_rays = bound.params.diffuse_count * cosine / PI;
+            let share = if is_around { 0.0 } else { outweighs(density, by_rays) };
             reflects = reflects.map(|c| c * share);
         }
-        if s.is_glossy() {
+        if s.is_glossy() && !(is_around && by_gloss) {
             let unit = normalize(d);
             let mut weight = 1.0;
-            if bound.has(PARAM_GLOSSY) && !bound.has(PARAM_BOUNCE) && density > 0.0 {
+            if by_gloss && density > 0.0 {
                 weight = outweighs(density, s.density(unit));
             }
             let reflected = s.reflected(unit);

@@ -75,12 +75,7 @@ impl Secondary for Dvf {
     }
 
     fn plan(&mut self, engine: &mut Engine, pass: Pass, plan: &mut Plan) -> Result<(), ExecutorError> {
-        let is_of_pass = matches!(
-            pass,
-            Pass::Shadow(Lamp::Environment)
-                | Pass::BounceShadow(Lamp::Environment)
-                | Pass::PathShadow(Lamp::Environment)
-        );
+        let is_of_pass = pass.lamp() == Some(Lamp::Environment);
         let (Some(field), Some(frame), true) = (&self.field, &self.frame, is_of_pass) else { return Ok(()) };
         let how = DvfUse { paper: self.is_paper(pass), ..self.how };
         let field = self.marked.as_ref().map_or(field, |marked| &marked.field);

@@ -367,21 +367,88 @@ fn a_white_object_vanishes_in_a_uniform_environment() {
     assert!((object - 0.8).abs() < 0.02, "a grey one shows: {object}");
 }
 
+/// An environment of 1 in a quarter of the directions around +Y and 0.1 in the others, all the way down: a white surface
+/// that faces up reflects 0.325. It is uneven: the mean square is 2.44 times the squared mean.
+fn quarter(folder: &Path) -> String {
+    environment(folder, "quarter.exr", (64, 32), |x, _| if x < 16 { 1.0 } else { 0.1 })
+}
+
 /// Of directions drawn evenly over the sphere half lie behind a surface, and those before it count by 4 times their
-/// cosine: a variance of 8/3 - 1 of the squared mean. One drawn from several by its cosine varies far less.
+/// cosine: a variance of 8/3 - 1 of the squared mean. One drawn from several by its cosine varies far less. Of an even
+/// environment one drawn by the cosine alone does not vary.
 #[test]
 fn directions_to_an_environment_are_drawn_for_the_surface() {
     let folder = common::folder();
     let folder = folder.path();
     let scene = converted(folder, "floor", "newmtl white\nKd 1 1 1\n", &format!("{FLOOR}usemtl white\nf 1 2 3 4\n"));
-    let around = environment(folder, "even.exr", (64, 32), |_, _| 0.5);
-    let values = render(&scene, &down_on(folder, 0.0), &format!("--effects environment --environment {around}"));
-    let mean = mean(&values);
-    let squares = values.iter().map(|&x| (f64::from(x) - mean).powi(2)).sum::<f64>();
-    let variance = squares / (values.len() - 1) as f64 / (mean * mean);
+    let even = environment(folder, "even.exr", (64, 32), |_, _| 0.5);
+    let path = down_on(folder, 0.0);
+    let found = |around: &str| {
+        let values = render(&scene, &path, &format!("--effects environment --environment {around}"));
+        let mean = mean(&values);
+        let squares = values.iter().map(|&x| (f64::from(x) - mean).powi(2)).sum::<f64>();
+        (mean, squares / (values.len() - 1) as f64 / (mean * mean))
+    };
     // 256 pixels: the mean is within three standard errors of 0.042, and the variance, of 0.45, well below 1.
-    assert!((mean / 0.5 - 1.0).abs() < 0.13, "{mean}");
+    let (mean, variance) = found(&quarter(folder));
+    assert!((mean / 0.325 - 1.0).abs() < 0.13, "{mean}");
     assert!(variance < 0.9, "{variance} of the squared mean");
+    let (mean, variance) = found(&even);
+    assert!((mean / 0.5 - 1.0).abs() < 1e-5 && variance < 1e-8, "{mean}, {variance} of the squared mean");
+}
+
+/// However the light of an environment comes: by rays to it, by those that surfaces draw, or by both. Beside a wall
+/// without end a floor sees half of an even environment, and of a white wall as much as that of it: after `n` bounces
+/// half and half of what came after `n - 1`.
+#[test]
+fn an_environment_is_as_bright_however_its_light_comes() {
+    let folder = common::folder();
+    let folder = folder.path();
+    let white = "newmtl white\nKd 1 1 1\n";
+    let shiny = "newmtl white\nKd 0.5 0.5 0.5\nKs 0.3 0.3 0.3\nNs 20\n";
+    let floor = format!("{FLOOR}usemtl white\nf 1 2 3 4\n");
+    let path = down_on(folder, 1.0);
+    let rotation = "--rotation full --diffuse-rays 1 --sun-intensity 0";
+    let even = environment(folder, "even.exr", (64, 32), |_, _| 1.0);
+    let quarter = quarter(folder);
+    let light = |scene: &Path, around: &str, effects: &str| {
+        let found = mean(&render(scene, &path, &format!("{rotation} --environment {around} --effects {effects}")));
+        let summary = common::json(&scene.with_extension("walk").join("summary.json"));
+        let rays = |pass: &str| summary["passes"][pass]["total"]["rays"].as_u64().unwrap_or(0);
+        (found, rays("environment"))
+    };
+    let open = converted(folder, "open", white, &floor);
+    for (around, truth) in [(&even, 1.0), (&quarter, 0.325)] {
+        for effects in ["environment", "diffuse", "environment,diffuse", "environment,diffuse,glossy"] {
+            // 16384 draws of what varies by up to 1.6 times its mean: 1.3 %, three times that.
+            let (found, rays) = light(&open, around, &format!("{effects} --spp 64"));
+            assert!((found / truth - 1.0).abs() < 0.04, "{effects}: {found}, not {truth}");
+            // Diffuse rays alone bring what is even.
+            let is_drawn = effects.contains("environment") && !(around == &even && effects.contains("diffuse"));
+            assert_eq!(rays > 0, is_drawn, "{effects}: {rays} rays");
+        }
+    }
+    let shiny = converted(folder, "shiny", shiny, &floor);
+    for around in [&even, &quarter] {
+        // Rays to it bring gloss; without them, rays that the gloss draws.
+        let (truth, _) = light(&shiny, around, "environment --spp 256");
+        assert!(truth > 0.5 * if around == &even { 1.0 } else { 0.325 }, "{truth}");
+        for (effects, is_drawn) in [("environment,diffuse", true), ("environment,diffuse,glossy", around != &even)] {
+            let (found, rays) = light(&shiny, around, &format!("{effects} --spp 128"));
+            assert!((found / truth - 1.0).abs() < 0.04, "{effects}: {found}, not {truth}");
+            assert_eq!(rays > 0, is_drawn, "{effects}: {rays} rays");
+        }
+    }
+    let wall = format!("{FLOOR}v 0 0 -200\nv 0 400 -200\nv 0 400 200\nv 0 0 200\nusemtl white\nf 1 2 3 4\nf 5 6 7 8\n");
+    let corner = converted(folder, "corner", white, &wall);
+    let mut before = 0.5;
+    for bounces in 1..=3 {
+        let truth = 0.5 + 0.5 * before;
+        let (found, _) = light(&corner, &even, &format!("environment,diffuse --spp 64 --bounces {bounces}"));
+        assert!((found / truth - 1.0).abs() < 0.015, "{bounces} bounces: {found}, not {truth}");
+        assert!((found / before - 1.0).abs() > 0.03, "the control must show");
+        before = truth;
+    }
 }
 
 #[test]

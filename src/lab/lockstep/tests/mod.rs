@@ -120,6 +120,8 @@ struct Variant {
     bounces: u32,
     /// Noise below which pixels take no more samples.
     noise: Option<f64>,
+    /// The environment is about as bright everywhere, and the effects are others.
+    even: Option<fn(Effects) -> Effects>,
     /// Frames of two samples are denoised, more than the averages over a few of them have.
     denoises: bool,
 }
@@ -144,6 +146,7 @@ const VARIANT: Variant = Variant {
     lod: Lod { pixels: 0.0, blend: false, angle: 0.0, given: false },
     bounces: 1,
     noise: None,
+    even: None,
     denoises: false,
 };
 
@@ -161,8 +164,9 @@ fn effects() -> Effects {
 }
 
 /// An environment, and emitters of every kind around `top`.
-fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
-    let image = Equirectangular::of(24, 12, |[x, y, z]| [1.2 + x, 1.1 + y, 1.5 + x * z]);
+fn lamps(scene: &SceneFile, top: DVec3, is_even: bool) -> Lamps {
+    let power = if is_even { 1.0 } else { 6.0 };
+    let image = Equirectangular::of(24, 12, |[x, y, z]| [1.2 + x, 1.1 + y, 1.5 + x * z].map(|c| c.powf(power)));
     let rectangle = Shape::Parallelogram { corner: top, edges: [DVec3::X * 3.0, DVec3::Z * 3.0] };
     let down = DVec3::new(0.1, -1.0, 0.2).normalize();
     let shapes = [
@@ -176,7 +180,9 @@ fn lamps(scene: &SceneFile, top: DVec3) -> Lamps {
     let mut emitters: Vec<Emitter> = shapes.map(|shape| Emitter { shape, two_sided: false, radiance }).into();
     let surfaces = emissive_triangles(scene, 1 << 20).unwrap().unwrap().emitters(scene.resident());
     emitters.extend(surfaces.iter().enumerate().map(|(i, e)| Emitter { two_sided: i % 2 == 0, ..*e }));
-    Lamps::new(Some(environment(image, 1.0, 40.0).0), emitters, 10.0)
+    let (environment, _) = environment(image, 1.0, 40.0);
+    assert_eq!(environment.is_even, is_even);
+    Lamps::new(Some(environment), emitters, 10.0)
 }
 
 /// Small maps, of both numbers of directions.
@@ -280,7 +286,7 @@ fn render(
     let mut light = Light::new(DVec3::new(0.4, 0.8, 0.45), 2.0, 1.0, 1.0);
     let manifest = &scene.resident().manifest;
     let top = DVec3::new(0.0, manifest.max[1] + 1.0, 0.0);
-    light.lamps = Arc::new(lamps(scene, top));
+    light.lamps = Arc::new(lamps(scene, top, variant.even.is_some()));
     let engine = Engine {
         scene: scene.clone(),
         executor: Box::new(executor),
@@ -296,7 +302,7 @@ fn render(
                 (0.5 * (min + max), normal.normalize())
             }),
             schedule: variant.schedule,
-            effects: Effects { bounces: variant.bounces, ..effects() },
+            effects: Effects { bounces: variant.bounces, ..variant.even.map_or_else(effects, |even| even(effects())) },
             samples: if variant.noise.is_some() { LEAST + 1 } else { 1 + u32::from(variant.denoises) },
             noise: variant.noise,
             seed: 3,
@@ -397,6 +403,9 @@ fn twins_agree_with_their_kernels() {
         Variant { clip: Some(DVec3::new(0.3, 1.0, -0.2)), ..VARIANT },
         Variant { half_rate: true, ..VARIANT },
         Variant { bounces: 3, ..VARIANT },
+        Variant { even: Some(|all| all), bounces: 2, ..VARIANT },
+        Variant { even: Some(|all| Effects { glossy: false, turn_degrees: 360.0, ..all }), ..VARIANT },
+        Variant { even: Some(|all| Effects { diffuse: None, ..all }), everything_fits: true, ..VARIANT },
         // Some blocks stop, and some go on.
         Variant { noise: Some(0.05), everything_fits: true, schedule: Schedule::Plain, ..VARIANT },
         Variant { noise: Some(0.1), everything_fits: true, ..VARIANT },
