@@ -113,11 +113,6 @@ impl Demand {
         self.add(1, entry_bits(near));
     }
 
-    /// Adds a ray that enters before any other brick that it asks for.
-    pub fn add_next(&self) {
-        self.next.fetch_add(1, Ordering::Relaxed);
-    }
-
     /// What was asked.
     pub fn get(&self) -> layout::Demand {
         let [rays, nearest, next] = [&self.rays, &self.nearest, &self.next].map(|x| x.load(Ordering::Relaxed));
@@ -128,6 +123,74 @@ impl Demand {
     pub fn take(&self) -> layout::PairDemand {
         let rays = self.rays.swap(0, Ordering::Relaxed);
         layout::PairDemand { rays, nearest: self.nearest.swap(u32::MAX, Ordering::Relaxed) }
+    }
+}
+
+/// What the rays of one task ask of bricks, added up before what all tasks write is touched: rays of a bounce ask for the
+/// same few bricks in no order, and cores would wait for one another's.
+#[derive(Default)]
+pub struct DemandTally(Vec<Asked>);
+
+/// Of one brick.
+#[derive(Clone)]
+struct Asked {
+    brick: u32,
+    rays: u32,
+    nearest: u32,
+    next: u32,
+}
+
+impl Asked {
+    const NOTHING: Self = Self { brick: layout::NONE, rays: 0, nearest: u32::MAX, next: 0 };
+
+    fn tell(&self, demand: &[Demand]) {
+        if self.brick == layout::NONE {
+            return;
+        }
+        let all = &demand[self.brick as usize];
+        if self.rays > 0 {
+            all.add(self.rays, self.nearest);
+        }
+        if self.next > 0 {
+            all.next.fetch_add(self.next, Ordering::Relaxed);
+        }
+    }
+}
+
+impl DemandTally {
+    /// A power of two.
+    const BRICKS: usize = 256;
+
+    #[inline(always)]
+    fn of(&mut self, demand: &[Demand], brick: usize) -> &mut Asked {
+        if self.0.is_empty() {
+            self.0.resize(Self::BRICKS, Asked::NOTHING);
+        }
+        let asked = &mut self.0[brick % Self::BRICKS];
+        if asked.brick != brick as u32 {
+            asked.tell(demand);
+            *asked = Asked { brick: brick as u32, ..Asked::NOTHING };
+        }
+        asked
+    }
+
+    /// Adds a ray that enters a brick at `near`.
+    #[inline(always)]
+    pub fn add_ray(&mut self, demand: &[Demand], brick: usize, near: f32) {
+        let asked = self.of(demand, brick);
+        asked.rays += 1;
+        asked.nearest = asked.nearest.min(entry_bits(near));
+    }
+
+    /// Adds a ray that enters a brick before any other that it asks for.
+    #[inline(always)]
+    pub fn add_next(&mut self, demand: &[Demand], brick: usize) {
+        self.of(demand, brick).next += 1;
+    }
+
+    /// Tells what has been added up.
+    pub fn finish(&mut self, demand: &[Demand]) {
+        self.0.drain(..).for_each(|asked| asked.tell(demand));
     }
 }
 

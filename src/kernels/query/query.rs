@@ -20,7 +20,7 @@ use crate::kernels::vector::least;
 /// occluded ask only for the brick that holds their hit.
 pub fn query(bound: &Bound, set: &mut RaySet, lists: &TileLists) {
     if bound.has(PARAM_NEEDED) {
-        for_each_ray(set, bound, Work::Chosen(&lists.chosen), |_, slot| needed(bound, &slot, lists));
+        for_each_ray(set, bound, Work::Chosen(&lists.chosen), |scratch, slot| needed(bound, scratch, &slot, lists));
     } else {
         run_for_each_packet(set, bound, Work::Chosen(&lists.chosen), &Query { bound, lists });
     }
@@ -41,7 +41,7 @@ impl PacketKernel for Query<'_> {
 
     /// As [`needed`] for hits that are not final, where the rays that enter no child of a root are told together.
     #[inline(always)]
-    fn run_packet<I: Isa>(&self, isa: I, _: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
         let Self { bound, lists } = self;
         let (scene, entry, packet) = (bound.scene, lists.lists[tile], &mut packets.packet);
         let up_to_next = bound.has(PARAM_NEXT);
@@ -100,7 +100,7 @@ impl PacketKernel for Query<'_> {
         }
         for (brick, _) in first {
             if brick != NONE {
-                bound.demand[brick as usize].add_next();
+                scratch.demand.add_next(bound.demand, brick as usize);
             }
         }
     }
@@ -111,7 +111,7 @@ impl PacketKernel for Query<'_> {
 }
 
 /// What a ray needed, its hit being final.
-fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
+fn needed(bound: &Bound, scratch: &mut Scratch, slot: &Slot, lists: &TileLists) {
     let entry = lists.lists[slot.tile];
     if !slot.is_traced() {
         return;
@@ -149,6 +149,6 @@ fn needed(bound: &Bound, slot: &Slot, lists: &TileLists) {
         }
     }
     if let Some((brick, _)) = first {
-        bound.demand[brick].add_next();
+        scratch.demand.add_next(bound.demand, brick);
     }
 }

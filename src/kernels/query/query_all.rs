@@ -80,7 +80,7 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, (p
     }
     let cone = bound.cone_of(ray.origin, ray.direction, spread_of(slot.surface));
     if WHAT == STAND_INS && is_stand_in(bound, &cone, slot.surface.leaf) {
-        bound.demand[bound.brick_of(slot.surface.leaf)].add_ray(hit.t);
+        scratch.demand.add_ray(bound.demand, bound.brick_of(slot.surface.leaf), hit.t);
         set_pending(slot.surface, true);
     }
     if !slot.is_traced() || bound.params.top_count == 0 || occluded || asks_nothing {
@@ -91,7 +91,7 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, (p
     let up_to_next = WHAT != PAIRS && bound.has(PARAM_NEXT);
     let mut r = BrickRay::outside(&world);
     let lanes = Lanes::new(&world, [0.0; 3], [0.0; 3]);
-    let Scratch { entered: stack, tally, .. } = scratch;
+    let Scratch { entered: stack, tally, demand, .. } = scratch;
     stack.clear();
     stack.push((0, 0.0));
     let mut asks = 0;
@@ -157,7 +157,7 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, (p
                 count(bound, tally, pairs.add(slot.tile, leaf));
                 continue;
             }
-            bound.demand[brick].add_ray(near);
+            demand.add_ray(bound.demand, brick, near);
             asks += 1;
             if first.is_none_or(|(_, nearest)| near < nearest) {
                 first = Some((brick, near));
@@ -170,7 +170,7 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, (p
     if let Some((brick, _)) = first {
         set_pending(slot.surface, true);
         slot.surface.pending |= if is_missing { PENDING_MISSING } else { 0 };
-        bound.demand[brick].add_next();
+        demand.add_next(bound.demand, brick);
         tally.add(COUNTER_PAIRS_VISIBLE, asks);
     }
 }

@@ -22,34 +22,36 @@ fn bounds_of(bound: &Bound, set: &RaySet, tile: u32) -> TileBounds {
     let p = bound.params;
     let (x0, y0) = ((tile % p.tiles_x) * p.tile, (tile / p.tiles_x) * p.tile);
     let (x1, y1) = ((x0 + p.tile).min(p.width), (y0 + p.tile).min(p.height));
-    let mut b = TileBounds {
-        origin_min: [T_INFINITE; 3],
-        t_min: T_INFINITE,
-        origin_max: [-T_INFINITE; 3],
-        t_max: 0.0,
-        direction_min: [T_INFINITE; 3],
-        rays: 0,
-        direction_max: [-T_INFINITE; 3],
-        spreads: 0,
-    };
-    let mut spreads = [T_INFINITE, 0.0];
+    // Of the numbers of a ray, which lie side by side: origin, t_min, direction, t_max.
+    let (mut min, mut max) = ([T_INFINITE; 8], [-T_INFINITE; 8]);
+    let (mut rays, mut t_max, mut spreads) = (0, 0.0, [T_INFINITE, 0.0]);
     for y in y0..y1 {
         for x in x0..x1 {
             let at = (y * p.width + x) as usize;
             let ray = &set.rays[at];
             if is_traced(ray, &set.hits[at]) {
-                b.origin_min = each(|k| least(b.origin_min[k], ray.origin[k]));
-                b.origin_max = each(|k| most(b.origin_max[k], ray.origin[k]));
-                b.direction_min = each(|k| least(b.direction_min[k], ray.direction[k]));
-                b.direction_max = each(|k| most(b.direction_max[k], ray.direction[k]));
-                b.t_min = least(b.t_min, ray.t_min);
-                b.t_max = most(b.t_max, set.hits[at].t);
-                b.rays += 1;
+                let numbers: [f32; 8] = bytemuck::cast(*ray);
+                for k in 0..8 {
+                    min[k] = least(min[k], numbers[k]);
+                    max[k] = most(max[k], numbers[k]);
+                }
+                t_max = most(t_max, set.hits[at].t);
+                rays += 1;
                 let own = spread_of(&set.surfaces[at]);
                 spreads = [least(spreads[0], own), most(spreads[1], own)];
             }
         }
     }
+    let mut b = TileBounds {
+        origin_min: each(|k| min[k]),
+        t_min: min[3],
+        origin_max: each(|k| max[k]),
+        t_max,
+        direction_min: each(|k| min[4 + k]),
+        rays,
+        direction_max: each(|k| max[4 + k]),
+        spreads: 0,
+    };
     if b.rays > 0 {
         let [least, most] = spreads.map(f32::to_bits);
         b.spreads = least & 0xffff_0000 | (most + 0xffff) >> 16;

@@ -8,7 +8,7 @@ use super::lamps::{
 };
 use super::light::{add_light as add, ambient, background, sunlight};
 use super::more::Shown;
-use crate::kernels::bound::{Bound, Tally, atomic};
+use crate::kernels::bound::{Bound, DemandTally, Tally, atomic};
 use crate::kernels::layout::{
     BATCH_SAMPLES, EMITTER_KIND, EMITTER_TRIANGLE, GBUFFER_BACK, GBuffer, Hit, MATERIAL_DOUBLE_SIDED, MATERIAL_UNLIT,
     MET, More, NONE, Origin, PARAM_BOUNCE, PARAM_EMISSION, PARAM_EMITTER, PARAM_ENVIRONMENT, PARAM_GLOSSY, PARAM_MISS,
@@ -319,21 +319,10 @@ pub fn add_occlusion(
 /// Counts, per brick, the final hits of a pass.
 pub fn hit_demand(bound: &Bound, own: &RaySet) {
     own.surfaces.par_chunks(8 * RUN).for_each(|run| {
-        // Rays of a bounce hit leaves in no order: their hits are added up before what all cores write is touched.
-        let mut sums = [(NONE, 0); 256];
-        let add = |(leaf, hits): (u32, u32)| {
-            if hits > 0 {
-                bound.demand[bound.brick_of(leaf)].add(hits, 0);
-            }
-        };
+        let mut demand = DemandTally::default();
         for leaf in run.iter().map(|surface| surface.leaf).filter(|&leaf| leaf != NONE) {
-            let sum = &mut sums[leaf as usize % 256];
-            if sum.0 != leaf {
-                add(*sum);
-                *sum = (leaf, 0);
-            }
-            sum.1 += 1;
+            demand.add_ray(bound.demand, bound.brick_of(leaf), 0.0);
         }
-        sums.into_iter().for_each(add);
+        demand.finish(bound.demand);
     });
 }

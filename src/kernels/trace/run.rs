@@ -131,6 +131,7 @@ fn for_each_block(
             }
         }
         bound.counters.add(&task.scratch.tally);
+        task.scratch.demand.finish(bound.demand);
     });
 }
 
