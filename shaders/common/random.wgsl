@@ -56,9 +56,9 @@ fn points2(pixel: u32, stream: u32, seed: u32) -> vec2<f32> {
     return vec2<f32>(spread2(stream & 0xffffffu, hash) >> vec2<u32>(8u)) * 5.9604645e-8;
 }
 
-// Points2 of which pixels of a block share the first binary digits, `strata` of both numbers together: their rays agree,
-// and a run of 2^strata samples has all strata. Digits are scrambled by those before them, so what follows the shared
-// ones is the pixel's own: samples of neighbours differ within a stratum, and errors of such runs do not agree.
+// points2, of which pixels of a block share the first binary digits, `strata` of both numbers together: their rays
+// agree, and a run of 2^strata samples has all strata. Digits are scrambled by those before them, so what follows the
+// shared ones is the pixel's own: samples of neighbours differ within a stratum, and errors of such runs do not agree.
 fn points2_near(pixel: u32, block: u32, stream: u32, seed: u32, strata: u32) -> vec2<f32> {
     let by_block = pcg(block ^ pcg((stream >> 24u) ^ pcg(seed ^ GOLDEN)));
     let own = pcg(pixel ^ pcg(by_block));

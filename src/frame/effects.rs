@@ -6,8 +6,8 @@ pub struct Effects {
     /// Shadows of the sun and of emitters, at primary hits and at the hits of diffuse and glossy rays.
     pub shadow: bool,
     /// The light of the environment, shadowed, at the same hits. Of an uneven one a direction is drawn by its radiance,
-    /// and diffuse rays that miss share it with them. An even one is brought by diffuse and glossy rays and paths alone,
-    /// where there are some ([`crate::kernels::lamps::Environment::is_even`]).
+    /// and diffuse rays that miss share it with them. An even one is brought by diffuse and glossy rays and paths
+    /// alone, where there are some ([`crate::kernels::lamps::Environment::is_even`]).
     pub environment: bool,
     /// Ambient occlusion, of the sky's light.
     pub occlusion: Option<Occlusion>,

@@ -126,8 +126,8 @@ impl Demand {
     }
 }
 
-/// What the rays of one task ask of bricks, added up before what all tasks write is touched: rays of a bounce ask for the
-/// same few bricks in no order, and cores would wait for one another's.
+/// What the rays of one task ask of bricks, added up before what all tasks write is touched: rays of a bounce ask for
+/// the same few bricks in no order, and cores would wait for one another's.
 #[derive(Default)]
 pub struct DemandTally(Vec<Asked>);
 

@@ -37,8 +37,8 @@ impl Work for OfDisc<'_, '_> {
     }
 }
 
-/// The pass's direction around normals, turned about them at random within limits, or scattered over the hemisphere, for
-/// rays from number `first` on.
+/// The pass's direction around normals, turned about them at random within limits, or scattered over the hemisphere,
+/// for rays from number `first` on.
 pub struct Around<'a, 'b> {
     /// What is bound.
     pub bound: &'a Bound<'b>,

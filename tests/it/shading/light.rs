@@ -367,8 +367,8 @@ fn a_white_object_vanishes_in_a_uniform_environment() {
     assert!((object - 0.8).abs() < 0.02, "a grey one shows: {object}");
 }
 
-/// An environment of 1 in a quarter of the directions around +Y and 0.1 in the others, all the way down: a white surface
-/// that faces up reflects 0.325. It is uneven: the mean square is 2.44 times the squared mean.
+/// An environment of 1 in a quarter of the directions around +Y and 0.1 in the others, all the way down: a white
+/// surface that faces up reflects 0.325. It is uneven: the mean square is 2.44 times the squared mean.
 fn quarter(folder: &Path) -> String {
     environment(folder, "quarter.exr", (64, 32), |x, _| if x < 16 { 1.0 } else { 0.1 })
 }
