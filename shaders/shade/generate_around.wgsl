@@ -1,8 +1,9 @@
 // One ray from every hit of the shaded set in the pass's direction around the interpolated normal, turned about it at
 // random within limits (CHC+RT §5.3), or, scattered, moved over the whole hemisphere by a random step in the two
 // numbers that it comes from (Cranley and Patterson 1976: the turn, and the square of the sine); where that leads below
-// the surface, none. Limited rays ask for occlusion, or for an even environment; for the others the throughput is noted:
-// what of light from around the surface reflects, by the share of the direction; in w the density of the direction.
+// the surface, none. Limited rays ask for occlusion, or for an even environment. For the others the throughput is
+// noted: what of light from around the surface reflects, by the share of the direction; in w the density of the
+// direction.
 #include "common/types.wgsl"
 #include "common/bindings.wgsl"
 #include "shade/shading.wgsl"
