@@ -25,9 +25,7 @@ struct Params {           // What every kernel is told.
     sun_color: vec4<f32>, // irradiance of a surface that faces the sun
     sky_color: vec4<f32>, // of the zenith
     ground_color: vec4<f32>, // below the horizon
-    jitter: vec2<f32>,    // offset within the pixel, in pixels
-    strata: u32,          // binary digits of where samples lie that pixels of 8 x 8 share (random.wgsl)
-    unused: u32,          // so that vectors of four start where they must
+    jitter: vec4<f32>,    // x, y: offset within the pixel, in pixels
     // direction of the pass's rays in the frame of the normal, z along it; w: greatest turn about it, radians
     around: vec4<f32>,
     share: f32,           // of the light that the pass's direction stands for

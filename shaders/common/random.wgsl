@@ -56,21 +56,6 @@ fn points2(pixel: u32, stream: u32, seed: u32) -> vec2<f32> {
     return vec2<f32>(spread2(stream & 0xffffffu, hash) >> vec2<u32>(8u)) * 5.9604645e-8;
 }
 
-// points2, of which pixels of a block share the first binary digits, `strata` of both numbers together: their rays
-// agree, and a run of 2^strata samples has all strata. Digits are scrambled by those before them, so what follows the
-// shared ones is the pixel's own: samples of neighbours differ within a stratum, and errors of such runs do not agree.
-fn points2_near(pixel: u32, block: u32, stream: u32, seed: u32, strata: u32) -> vec2<f32> {
-    let by_block = pcg(block ^ pcg((stream >> 24u) ^ pcg(seed ^ GOLDEN)));
-    let own = pcg(pixel ^ pcg(by_block));
-    let words = spread2(stream & 0xffffffu, by_block);
-    let both = reverseBits(words);
-    let by_pixel = reverseBits(vec2<u32>(scrambled(both.x, own), scrambled(both.y, pcg(own))));
-    // Of turns about the normal more are shared than of heights: strata are about as wide as high.
-    let second = (max(strata, 1u) - 1u) / 2u;
-    let is_own = vec2<u32>(0xffffffffu) >> vec2<u32>(strata - second, second);
-    return vec2<f32>(((words & ~is_own) | (by_pixel & is_own)) >> vec2<u32>(8u)) * 5.9604645e-8;
-}
-
 // Shirley and Chiu's concentric map of the unit square to the unit disc.
 fn disc_point(r: vec2<f32>) -> vec2<f32> {
     let p = 2.0 * r - vec2<f32>(1.0);

@@ -13,16 +13,12 @@
 #include "shade/light.wgsl"
 #include "shade/gloss.wgsl"
 
-// By which the direction is moved.
+// By which the direction is moved; rays from hits of bounces have some of their own in every direction that their paths
+// begin with.
 fn moved_by(index: u32) -> vec2<f32> {
-    let pixel = pixel_of(index);
+    var pixel = pixel_of(index);
     if (params.flags & PARAM_BOUNCE) != 0u {
-        // Of their own in every direction that their paths begin with.
-        return points2(pixel ^ pcg(origins[index].direction + 1u), params.stream, params.seed);
-    }
-    if (params.flags & PARAM_SCATTER) != 0u {
-        let block = pixel / params.width / 8u * ((params.width + 7u) / 8u) + pixel % params.width / 8u;
-        return points2_near(pixel, block, params.stream, params.seed, params.strata);
+        pixel ^= pcg(origins[index].direction + 1u);
     }
     return points2(pixel, params.stream, params.seed);
 }

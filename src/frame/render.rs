@@ -4,7 +4,7 @@ use super::bands::Joint;
 use super::correct::correct;
 use super::engine::RenderSettings;
 use super::half_rate;
-use super::noise::{LEAST, Noise, ROUND};
+use super::noise::{LEAST, Noise};
 use super::{
     Accumulation, BATCH_SAMPLES, Effects, Engine, FrameRecords, GuideReader, Guides, Methods, Moved, PixelState,
     Pixels, camera_view,
@@ -224,8 +224,6 @@ impl Band<'_> {
         let mut noise = engine.settings.noise.map(|target| Noise::new(target, rows));
         // So many samples stand for a pixel when textures are looked up.
         let shares = if noise.is_some() { LEAST } else { engine.settings.samples };
-        // Where noise is judged, and at the end, pixels have all strata.
-        let strata = (engine.settings.samples | ROUND).trailing_zeros();
         let mut guides = engine.settings.guides.then(|| GuideReader::new(camera, engine.size, &engine.moved));
         for sample in 0..engine.settings.samples {
             if sample.is_multiple_of(BATCH_SAMPLES)
@@ -248,10 +246,9 @@ impl Band<'_> {
             }
             // Each sample stands for its share of the pixel: textures are looked up by that.
             view.params.step_y[3] /= (shares as f32).sqrt();
-            view.params.strata = strata;
             if engine.settings.taa {
                 let [x, y] = pixel_jitter(frame, sample, engine.settings.samples);
-                view.params.jitter = [x, y];
+                view.params.jitter = [x, y, 0.0, 0.0];
             }
             engine.executor.begin_frame(&view);
             methods.iter_mut().for_each(|method| method.begin(camera, &view));

@@ -44,7 +44,7 @@ pub fn camera_view(
         sun_color: color(light.sun_color),
         sky_color: color(light.sky_color),
         ground_color: color(light.ground_color),
-        jitter: [jx, jy],
+        jitter: [jx, jy, 0.0, 0.0],
         emitter_count: light.lamps.emitters().len() as u32,
         emitter_density: (light.lamps.density_of_surfaces() * frame.unit * frame.unit) as f32,
         sample,

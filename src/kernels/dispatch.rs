@@ -9,11 +9,7 @@ use crate::schedule::{Lamp, Over, Own, Pass, Query, Step};
 /// Direction `index` about z of passes that start at hits, before it is turned or scattered.
 pub fn direction_around(index: u32) -> [f32; 3] {
     // The first point of the sequence is a corner of the square.
-    around(index + 1)
-}
-
-fn around(index: u32) -> [f32; 3] {
-    cosine_hemisphere([halton(index, 0), halton(index, 1)])
+    cosine_hemisphere([halton(index + 1, 0), halton(index + 1, 1)])
 }
 
 impl Directions {
@@ -61,8 +57,7 @@ impl Directions {
         if let Some((index, count)) = direction {
             // Scattered, every sample moves the same directions: by what it moves them is spread over samples evenly.
             let index = if scatter { index % count.max(1) } else { index };
-            // Where directions are moved all the way round, the first is where they start.
-            let [x, y, z] = if scatter { around(index) } else { direction_around(index) };
+            let [x, y, z] = direction_around(index);
             params.around = [x, y, z, if scatter { std::f32::consts::TAU } else { self.turn }];
             params.flags |= flag(scatter, layout::PARAM_SCATTER);
             params.share = 1.0 / count.max(1) as f32;

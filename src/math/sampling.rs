@@ -167,35 +167,6 @@ pub fn points2_of<const N: usize>(pixels: [u32; N], stream: u32, seed: u32) -> [
     spread2(stream & 0x00ff_ffff, pixels.map(|pixel| pcg(pixel ^ by_stream))).map(|words| words.map(number_of))
 }
 
-/// [`points2_of`] of which pixels of a block share the first binary digits, `strata` of both numbers together, fewer
-/// than 32: their rays agree, and a run of 2^strata samples has all strata. What follows is the pixel's own. The
-/// kernels' `points2_near`, bit for bit.
-#[inline(always)]
-pub fn points2_near<const N: usize>(
-    pixels: [u32; N],
-    blocks: [u32; N],
-    stream: u32,
-    seed: u32,
-    strata: u32,
-) -> [[f32; N]; 2] {
-    let by_stream = pcg((stream >> 24) ^ pcg(seed ^ GOLDEN));
-    let by_block = blocks.map(|block| pcg(block ^ by_stream));
-    let mut own: [u32; N] = std::array::from_fn(|k| pcg(pixels[k] ^ pcg(by_block[k])));
-    // Of turns about the normal more are shared than of heights: strata are about as wide as high.
-    let second = strata.saturating_sub(1) / 2;
-    let digits = [strata - second, second];
-    let mut numbers = [[0.0; N]; 2];
-    for ((numbers, words), digits) in numbers.iter_mut().zip(spread2(stream & 0x00ff_ffff, by_block)).zip(digits) {
-        let is_shared = !(u32::MAX >> digits);
-        let by_pixel = scrambled(words.map(u32::reverse_bits), own);
-        for k in 0..N {
-            numbers[k] = number_of((words[k] & is_shared) | (by_pixel[k] & !is_shared));
-        }
-        own = own.map(pcg);
-    }
-    numbers
-}
-
 /// A word as a number in [0, 1).
 #[inline(always)]
 fn number_of(word: u32) -> f32 {
@@ -285,54 +256,6 @@ mod tests {
             let between = a.iter().zip(&b).map(|(p, q)| product(p[i], q[j])).sum::<f64>() / 1024.0;
             assert!(within.abs() < 0.012 && between.abs() < 0.012, "{i} {j}: {within} {between}");
         }
-    }
-
-    /// Runs of 2^strata samples have all strata, in the same order in all pixels of a block, and each elementary
-    /// interval; in its stratum every pixel's sample has a place of its own.
-    #[test]
-    fn samples_of_a_block_lie_in_the_same_strata() {
-        const PIXELS: [u32; 16] = [0, 1, 2, 3, 40, 41, 42, 43, 7, 900, 901, 902, 5, 6, 8, 77_777];
-        let run = |strata: u32, block: u32| {
-            let sample = |i: u32| points2_near(PIXELS, [block; 16], (5 << 24) + i, 9, strata);
-            (0..256).map(sample).collect::<Vec<_>>()
-        };
-        for (strata, [wide, high]) in [(0, [1, 1]), (1, [2, 1]), (2, [4, 1]), (3, [4, 2]), (4, [8, 2]), (6, [16, 4])] {
-            let samples = run(strata, 3);
-            let stratum = |i: usize, k: usize| {
-                let [x, y] = [samples[i][0][k], samples[i][1][k]];
-                (x * wide as f32) as usize * high + (y * high as f32) as usize
-            };
-            let of_pixel = |k: usize| (0..256).map(|i| stratum(i, k)).collect::<Vec<_>>();
-            assert!((1..16).all(|k| of_pixel(k) == of_pixel(0)), "{strata}: strata are shared");
-            for run in of_pixel(0).chunks(1 << strata) {
-                let mut strata = run.to_vec();
-                strata.sort_unstable();
-                assert!(strata.into_iter().eq(0..run.len()), "a run has all");
-            }
-            for (k, log2) in (0..16).flat_map(|k| (0..=4).map(move |log2| (k, log2))) {
-                let cell = |[x, y]: &[[f32; 16]; 2]| {
-                    let across = x[k] * (1 << log2) as f32;
-                    (across as usize) << 4 | (y[k] * (16 >> log2) as f32) as usize
-                };
-                let mut cells: Vec<usize> = samples[32..48].iter().map(cell).collect();
-                cells.sort_unstable();
-                cells.dedup();
-                assert_eq!(cells.len(), 16, "{strata}, pixel {k}: intervals of 1/{}", 1 << log2);
-            }
-            // Places within strata: over blocks, those of two pixels do not depend on one another.
-            let places: Vec<[f32; 16]> = (0..1024)
-                .map(|block| points2_near(PIXELS, [block; 16], (5 << 24) + 11, 9, strata)[0])
-                .map(|of_pixels| of_pixels.map(|x| (x * wide as f32).fract() - 0.5))
-                .collect();
-            let product = |k: usize| places.iter().map(|place| place[0] * place[k]).sum::<f32>() / 1024.0;
-            assert!((1..16).all(|k| product(k).abs() < 0.012), "{strata}");
-            assert!(product(0) > 0.07, "the control must show");
-        }
-        // Controls: another block has another order, and without strata none is shared.
-        let order =
-            |samples: &[[[f32; 16]; 2]], k: usize| samples.iter().map(|s| (s[0][k] * 8.0) as u32).collect::<Vec<_>>();
-        assert_ne!(order(&run(4, 3), 0), order(&run(4, 4), 0));
-        assert_ne!(order(&run(0, 3), 0), order(&run(0, 3), 1));
     }
 
     #[test]

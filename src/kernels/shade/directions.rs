@@ -7,7 +7,7 @@ use crate::kernels::layout::{Origin, PARAM_BOUNCE, PARAM_SCATTER};
 use crate::kernels::simd::isa::{Isa, Work};
 use crate::kernels::vector::{Vec3, cross, most, normalize};
 use crate::math::exact::barrier;
-use crate::math::sampling::{pcg, points2_near, points2_of};
+use crate::math::sampling::{pcg, points2_of};
 use crate::math::sines::sin_cos;
 
 /// Rays whose directions are made at once.
@@ -58,17 +58,13 @@ impl Work for Around<'_, '_> {
         let Self { bound, first, origins, normals } = self;
         let (p, is_scattered) = (bound.params, bound.has(PARAM_SCATTER));
         let mut pixels = pixels(bound, first, origins);
-        let [turns, heights] = if bound.has(PARAM_BOUNCE) {
+        if bound.has(PARAM_BOUNCE) {
             // Of their own in every direction that their paths begin with.
             for (k, pixel) in pixels.iter_mut().enumerate() {
                 *pixel ^= pcg(origins[(first + k).min(origins.len() - 1)].direction.wrapping_add(1));
             }
-            points2_of(pixels, p.stream, p.seed)
-        } else if is_scattered {
-            points2_near(pixels, blocks(bound, first), p.stream, p.seed, p.strata)
-        } else {
-            points2_of(pixels, p.stream, p.seed)
-        };
+        }
+        let [turns, heights] = points2_of(pixels, p.stream, p.seed);
         let a = p.around;
         let [sines, cosines] = sin_cos(turns.map(|turn| a[3] * turn));
         // The same bits everywhere: near 1 the height of the direction is sensitive to them.
@@ -104,21 +100,4 @@ fn pixels(bound: &Bound, first: usize, origins: &[Origin]) -> [u32; RUN] {
         let index = if bound.has(PARAM_BOUNCE) { (first + k).min(origins.len() - 1) } else { first + k };
         bound.pixel_of(index, origins)
     })
-}
-
-/// Numbers of their blocks of 8 x 8 pixels.
-#[inline(always)]
-fn blocks(bound: &Bound, first: usize) -> [u32; RUN] {
-    let p = bound.params;
-    let (mut row, mut column) = (p.first_row.wrapping_add(first as u32 / p.width), first as u32 % p.width);
-    let across = p.width.div_ceil(8);
-    let mut numbers = [0; RUN];
-    for number in &mut numbers {
-        *number = (row / 8).wrapping_mul(across).wrapping_add(column / 8);
-        column += 1;
-        if column == p.width {
-            (row, column) = (row.wrapping_add(1), 0);
-        }
-    }
-    numbers
 }
