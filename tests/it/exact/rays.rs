@@ -29,8 +29,9 @@ fn renderer(scene: &Path, adapter: &str, options: &str) -> Renderer {
     if !options.contains("environment") {
         return renderer;
     }
-    let even = Equirectangular::of(16, 8, |_| [1.0; 3]);
-    renderer.light.lamps = Arc::new(Lamps::new(Some(environment(even, 1.0, 0.0).0), Vec::new(), 1.0));
+    // An uneven one: of an even one diffuse rays bring the light, and no pass draws it from camera hits.
+    let uneven = Equirectangular::of(16, 8, |[x, _, z]| [if x > 0.0 && z > 0.0 { 1.0 } else { 0.1 }; 3]);
+    renderer.light.lamps = Arc::new(Lamps::new(Some(environment(uneven, 1.0, 0.0).0), Vec::new(), 1.0));
     renderer
 }
 

@@ -2,6 +2,7 @@
 //! measured again, and pictures of what moves flicker in the paper's mode alone.
 
 use crate::common::{folder, json, succeed};
+use exr::prelude::write_rgb_file;
 use serde_json::Value;
 use std::path::Path;
 
@@ -95,7 +96,12 @@ fn all_stages_are_measured_once_and_their_files_agree() {
 fn only_the_papers_mode_flickers() {
     let folder = folder();
     let output = folder.path().join("out");
-    run(&output, "--size 64x48 --samples 160 --points 100K --rays 32 --stages flicker");
+    // Directions are drawn by the light of an uneven environment: a sky over black ground.
+    let sky = folder.path().join("sky.exr");
+    let above = |y: usize| if y < 15 { 1.0f32 } else { 0.0 };
+    write_rgb_file(&sky, 64, 32, |_, y| (above(y), above(y), above(y))).expect("a sky");
+    let options = "--size 64x48 --samples 160 --points 100K --rays 32 --stages flicker --environment";
+    run(&output, &format!("{options} {}", sky.display()));
     let json = results(&output);
     let flicker = table(&json, "flicker");
     let of = |mode: &str, name: &str| entries(flicker, &[&format!("mode {mode}")], name);

@@ -60,7 +60,7 @@ const BOUNDS: [(&str, &str, f64, f64); 8] = [
     ("ao", "threshold", 0.0763, 2.81),
     ("ao", "denoised", 0.023, 0.506),
     ("environment", "dvf", 0.1196, 6.26),
-    ("environment", "threshold", 0.1244, 3.48),
+    ("environment", "threshold", 0.1257, 3.48),
     ("environment", "denoised", 0.166, 9.11),
 ];
 
