@@ -301,6 +301,9 @@ impl Executor for CpuExecutor {
         let mut ms_phases = [0.0; 3];
         let everything = bricks.all_geometry_resident();
         for &step in steps.iter().filter(|step| samples || !step.is_sampling()) {
+            if !step.leaves_pending() {
+                self.buffers.sets.iter_mut().for_each(|set| set.waiting.clear());
+            }
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };

@@ -177,9 +177,15 @@ impl DemandTally {
     /// Adds a ray that enters a brick at `near`.
     #[inline(always)]
     pub fn add_ray(&mut self, demand: &[Demand], brick: usize, near: f32) {
+        self.add(demand, brick, 1, entry_bits(near));
+    }
+
+    /// Adds `rays` that enter a brick, the first at `nearest`, as [`Demand::add`] takes it.
+    #[inline(always)]
+    pub fn add(&mut self, demand: &[Demand], brick: usize, rays: u32, nearest: u32) {
         let asked = self.of(demand, brick);
-        asked.rays += 1;
-        asked.nearest = asked.nearest.min(entry_bits(near));
+        asked.rays += rays;
+        asked.nearest = asked.nearest.min(nearest);
     }
 
     /// Adds a ray that enters a brick before any other that it asks for.

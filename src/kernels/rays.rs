@@ -2,6 +2,7 @@
 
 use super::layout::{Hit, NONE, Ray, Surface};
 use super::vector::dot;
+use std::sync::atomic::AtomicU64;
 
 /// Rays, hits and surfaces of one set, row by row.
 #[derive(Default)]
@@ -12,6 +13,9 @@ pub struct RaySet {
     pub hits: Vec<Hit>,
     /// Surfaces.
     pub surfaces: Vec<Surface>,
+    /// Which rays may be pending ([`super::trace::levels::is_pending`]): a word of each square of 8 x 8 rays, row by
+    /// row, with a bit a ray ([`super::trace::run`]). Empty: any of them.
+    pub waiting: Vec<AtomicU64>,
 }
 
 impl RaySet {
@@ -21,6 +25,7 @@ impl RaySet {
             rays: vec![Ray::default(); rays],
             hits: vec![Hit::default(); rays],
             surfaces: vec![Surface::default(); rays],
+            waiting: Vec::new(),
         }
     }
 
@@ -29,6 +34,7 @@ impl RaySet {
         self.rays.resize(rays, Ray::default());
         self.hits.resize(rays, Hit::default());
         self.surfaces.resize(rays, Surface::default());
+        self.waiting.clear();
     }
 
     /// How far a ray went to its hit, device units.

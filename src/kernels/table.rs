@@ -10,12 +10,13 @@ use super::paths::generate_path::generate_path;
 use super::paths::move_paths::{compact_paths, keep_paths};
 use super::payloads::AttributeView;
 use super::query::query::query;
-use super::query::query_all::{count_pairs, query_all};
+use super::query::query_all::count_pairs;
 use super::query::query_pairs::query_pairs;
 use super::query::stand_ins::query_stand_ins;
 use super::query::tile_bounds::tile_bounds;
 use super::query::tile_lists::{query_reduce, tile_choose, tile_scan, tile_select, tile_sort};
 use super::query::tile_walk::{tile_walk_count, tile_walk_write};
+use super::query::wanted::query_all;
 use super::rays::RaySet;
 use super::shade::clip_rays::clip_rays;
 use super::shade::generate::{

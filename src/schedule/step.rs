@@ -172,6 +172,11 @@ impl Step {
         matches!(self, Step::Sample | Step::SampleCoarser)
     }
 
+    /// Whether after it no ray is pending that was not before.
+    pub fn leaves_pending(self) -> bool {
+        matches!(self, Step::IntersectBatch | Step::IntersectAllBatch | Step::Query(_))
+    }
+
     /// Whether rays meet bricks in it.
     pub fn is_intersection(self) -> bool {
         matches!(

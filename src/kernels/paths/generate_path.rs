@@ -71,7 +71,7 @@ pub fn generate_path(bound: &Bound, own: &mut RaySet, seen: &RaySet, pixels: &Pi
         }
         step
     };
-    let RaySet { rays, hits, surfaces } = own;
+    let RaySet { rays, hits, surfaces, .. } = own;
     let all = rays.par_iter_mut().zip(hits).zip(surfaces).enumerate().with_min_len(256);
     all.for_each(|(index, ((own, hit), surface))| {
         let Step { ray, carried, density, alpha, curvature } = step(index);

@@ -59,7 +59,7 @@ impl Path {
 
 /// Moves the rays of `own` to `seen`, each to its place.
 pub fn keep_paths(_: &Bound, own: &RaySet, seen: &mut RaySet, pixels: &mut Pixels) {
-    let RaySet { rays, hits, surfaces } = seen;
+    let RaySet { rays, hits, surfaces, .. } = seen;
     let places = rays.par_iter_mut().zip(hits).zip(surfaces).zip(&mut pixels.throughput).zip(&mut pixels.origins);
     places.enumerate().with_min_len(1024).for_each(|(index, ((((ray, hit), surface), carried), origin))| {
         let path = Path::of(own, index);
@@ -91,7 +91,7 @@ fn compact(p: &Params, own: &RaySet, seen: &mut RaySet, pixels: &mut Pixels) -> 
         .collect();
     let order = of_bands.concat();
     let places = order.len().div_ceil(width).max(1) * width;
-    let RaySet { rays, hits, surfaces } = seen;
+    let RaySet { rays, hits, surfaces, .. } = seen;
     let moved = rays[..places].par_chunks_mut(band).zip(hits[..places].par_chunks_mut(band));
     let known = surfaces[..places].par_chunks_mut(band).zip(pixels.throughput[..places].par_chunks_mut(band));
     let all = moved.zip(known).zip(pixels.origins[..places].par_chunks_mut(band));

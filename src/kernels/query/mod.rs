@@ -10,3 +10,4 @@ pub mod stand_ins;
 pub mod tile_bounds;
 pub mod tile_lists;
 pub mod tile_walk;
+pub mod wanted;

@@ -1,7 +1,8 @@
 //! Ray-by-ray queries of the selected (tile, leaf) pairs: twin of `shaders/query/query.wgsl`. How many rays of the tile
 //! enter a child box of the brick's root at or before their present hit, and where the nearest does.
 
-use crate::kernels::bound::{Bound, entry_bits};
+use super::wanted::{First, enter_root};
+use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Hit, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT, Surface};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
@@ -9,12 +10,10 @@ use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::spread_of;
 use crate::kernels::trace::node::{entered_children, framed_ray};
-use crate::kernels::trace::packet::{Packet, RAYS};
-use crate::kernels::trace::packet_node::Place;
+use crate::kernels::trace::packet::Packet;
 use crate::kernels::trace::packet_walk::PacketScratch;
 use crate::kernels::trace::run::{PacketKernel, Work, for_each_ray, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
-use crate::kernels::vector::least;
 
 /// Of the rays of chosen tiles. With PARAM_NEEDED the hits are final and the rays of an any-hit pass that ended
 /// occluded ask only for the brick that holds their hit.
@@ -33,8 +32,10 @@ struct Query<'a> {
 }
 
 impl PacketKernel for Query<'_> {
+    const NARROWS: bool = false;
+
     #[inline(always)]
-    fn takes(&self, slot: &Slot) -> bool {
+    fn takes(&self, slot: &mut Slot) -> bool {
         let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
         slot.is_traced() && !is_occluded && self.lists.nearest[slot.tile] <= slot.hit.t
     }
@@ -43,66 +44,28 @@ impl PacketKernel for Query<'_> {
     #[inline(always)]
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
         let Self { bound, lists } = self;
-        let (scene, entry, packet) = (bound.scene, lists.lists[tile], &mut packets.packet);
-        let up_to_next = bound.has(PARAM_NEXT);
-        let any = packet.ray(0);
-        let mut r = BrickRay::outside(&any);
-        let mut first = [(NONE, 0.0); RAYS];
+        let entry = lists.lists[tile];
+        let PacketScratch { packet, entries, .. } = packets;
+        let mut r = BrickRay::outside(&packet.ray(0));
+        let mut first = First::nothing();
         for next in entry.first..entry.first + entry.selected {
             let position = lists.selection[next as usize] as usize;
             let listed = lists.list[position];
             let leaf = bound.leaf_of(&listed);
             // Their distances are their limits.
             let rays = packet.taking(bound, leaf, packet.reaching(isa, listed.near));
-            let mut rays = packet.meeting(bound, listed.node, rays);
+            let rays = packet.meeting(bound, listed.node, rays);
             if rays == 0 {
                 continue;
             }
-            let brick = bound.brick_of(leaf);
-            let root = &scene.roots[brick];
-            if bound.is_world(listed.node) {
-                r.enter_leaf(scene, &any, leaf);
-                let place = Place::new(r.offset_high, r.offset_low, 0.0);
-                let mut entered = [0; 8];
-                packet.open(isa, root, &place, rays, &mut entered);
-                rays = 0;
-                for child in entered {
-                    rays |= child;
-                }
-            }
-            let (mut asking, mut nearest, mut is_nearer) = (0, u32::MAX, false);
-            while rays != 0 {
-                let i = rays.trailing_zeros() as usize;
-                rays &= rays - 1;
-                r.enter_leaf(scene, &packet.ray(i), leaf);
-                let limit = &mut packet.t.0[i];
-                let boxes = isa.hits(&r.ray, &r.lanes, root, 0.0, *limit);
-                let (entered, near) = entered_children(&boxes, root);
-                if entered == 0 {
-                    continue;
-                }
-                asking += 1;
-                nearest = nearest.min(entry_bits(near));
-                if first[i].0 == NONE || near < first[i].1 {
-                    first[i] = (brick as u32, near);
-                    if up_to_next {
-                        *limit = least(*limit, near);
-                        is_nearer = true;
-                    }
-                }
-            }
-            if asking > 0 {
-                lists.pair_demand[position].add(asking, nearest);
-            }
-            if is_nearer {
-                packet.shorten(isa);
+            let asking = enter_root(isa, (bound, &mut r, leaf), packet, rays, entries);
+            if asking != 0 {
+                let brick = bound.brick_of(leaf);
+                let nearest = first.note(isa, packet, (asking, brick), &entries.brick, bound.has(PARAM_NEXT));
+                lists.pair_demand[position].add(asking.count_ones(), nearest);
             }
         }
-        for (brick, _) in first {
-            if brick != NONE {
-                scratch.demand.add_next(bound.demand, brick as usize);
-            }
-        }
+        first.tell(bound, scratch);
     }
 
     /// Their limits are no hits.

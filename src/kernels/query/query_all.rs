@@ -1,7 +1,7 @@
 //! Ray-by-ray queries of the whole top level: twin of `shaders/query/query_all.wgsl`. Near children first, each ray
-//! asks for the bricks in the wanted state of whose root it enters a child box at or before its present hit, and notes
-//! whether it asked for any. Or it asks for nothing, and counted is how many rays of a tile see each leaf. Or it asks,
-//! for the bricks that it would enter if nothing were missing, those that stand in for them.
+//! looks for the bricks of whose root it enters a child box at or before its present hit. It asks for nothing, and
+//! counted is how many rays of a tile see each leaf. Or it asks, for the bricks that it would enter if nothing were
+//! missing, those that stand in for them. Rays that ask for missing bricks do so together: [`super::wanted`].
 
 use crate::kernels::bound::{Bound, Tally};
 use crate::kernels::layout::{
@@ -19,58 +19,20 @@ use crate::kernels::trace::scratch::Scratch;
 use crate::kernels::vector::least;
 
 /// MAX_TOP_HEIGHT levels of which each leaves at most 7 siblings, and the root.
-const TOP_STACK_SIZE: usize = 192;
-
-/// Of the rays of `work`, all or those that walk from the root.
-pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts) {
-    let leading = leading(bound, set.rays.len());
-    for_each_ray(set, bound, work, |scratch, slot| ask::<WANTED>(bound, scratch, slot, (pairs, &leading)));
-}
+pub const TOP_STACK_SIZE: usize = 192;
 
 /// Of all rays: how many of a tile see each leaf. `pairs` have been started.
 pub fn count_pairs(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
-    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<PAIRS>(bound, scratch, slot, (pairs, &[])));
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<PAIRS>(bound, scratch, slot, pairs));
 }
 
-/// Of each node of the top level the children that lead to a brick in the wanted state, a bit each. A ray asks for
-/// nothing below others, so it need not walk there. Empty where there are too few rays for that to pay.
-fn leading(bound: &Bound, rays: usize) -> Vec<u8> {
-    let nodes = &bound.scene.top8;
-    if nodes.len() > rays / RAYS_A_NODE {
-        return Vec::new();
-    }
-    let mut leading = vec![0u8; nodes.len()];
-    // Children lie behind their parents.
-    for (index, node) in nodes.iter().enumerate().rev() {
-        let inner = u32::from(node.inner_mask);
-        let leads = |slot: &u32| {
-            if inner & 1 << slot != 0 {
-                return leading[(node.child_base + inner_before(inner, *slot)) as usize] != 0;
-            }
-            let leaf = node.triangle_base + u32::from(node.meta[*slot as usize] & 31);
-            bound.is_selected(bound.brick_of(leaf))
-        };
-        let children = (0..8u32).filter(|&slot| node.meta[slot as usize] != 0);
-        leading[index] = children.filter(leads).fold(0, |bits, slot| bits | 1 << slot);
-    }
-    leading
-}
-
-/// With fewer rays for each node of the top level, looking through all nodes costs more than it saves.
-const RAYS_A_NODE: usize = 4;
-
-/// What a ray asks for: bricks in the wanted state.
-const WANTED: u32 = 0;
-/// Nothing; it counts for pairs.
+/// What a ray asks for: nothing, it counts for pairs.
 const PAIRS: u32 = 1;
 /// What stands in.
 pub const STAND_INS: u32 = 2;
 
-/// Queries of one ray. It walks to the children in `leading` alone, which may be empty: then to all.
-pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, (pairs, leading): (&PairCounts, &[u8])) {
-    if WHAT == WANTED && !is_pending(slot.surface) {
-        return;
-    }
+/// Queries of one ray.
+pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, pairs: &PairCounts) {
     let (ray, hit) = (*slot.ray, *slot.hit);
     // Of rays for stand-ins those that are pending may ask.
     let asks_nothing = WHAT == STAND_INS && !is_pending(slot.surface);
@@ -105,8 +67,7 @@ pub fn ask<const WHAT: u32>(bound: &Bound, scratch: &mut Scratch, slot: Slot, (p
         }
         let node = &scene.top8[at as usize];
         let boxes = bound.isa.hits(&world, &lanes, node, bound.params.instance_pad, limit);
-        let leading = leading.get(at as usize).map_or(u32::MAX, |&children| children.into());
-        let mut bits = by_priority(boxes.mask & leading, node, world.flip);
+        let mut bits = by_priority(boxes.mask, node, world.flip);
         let inner = u32::from(node.inner_mask);
         while bits != 0 {
             // The farthest: the nearest is to be on top of the stack.

@@ -19,7 +19,7 @@ use crate::kernels::trace::scratch::Scratch;
 /// Of all rays: what stands in for what they would enter.
 pub fn query_stand_ins(bound: &Bound, set: &mut RaySet, pairs: &PairCounts) {
     run_for_each_packet(set, bound, Work::All, &Askers { bound });
-    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<STAND_INS>(bound, scratch, slot, (pairs, &[])));
+    for_each_ray(set, bound, Work::All, |scratch, slot| ask::<STAND_INS>(bound, scratch, slot, pairs));
 }
 
 /// What [`query_stand_ins`] left each ray with: [`crate::schedule::Report::states`].
@@ -34,8 +34,10 @@ struct Askers<'a> {
 }
 
 impl PacketKernel for Askers<'_> {
+    const NARROWS: bool = false;
+
     #[inline(always)]
-    fn takes(&self, slot: &Slot) -> bool {
+    fn takes(&self, slot: &mut Slot) -> bool {
         let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
         slot.is_traced() && !is_occluded && is_pending(slot.surface) && self.bound.params.top_count != 0
     }
@@ -51,8 +53,8 @@ impl PacketKernel for Askers<'_> {
         let mut depth = 0;
         let mut next = Some((0, packet.all()));
         loop {
-            if let Some(visit) = next.take() {
-                let group = top_group(isa, bound, packet, &whole, visit);
+            if let Some((index, rays)) = next.take() {
+                let group = top_group(isa, bound, packet, &whole, (index, u32::MAX, rays));
                 if !put(top, &mut depth, group, &mut scratch.tally) {
                     break;
                 }

@@ -37,7 +37,7 @@ fn for_each_in_runs<T>(
     of_run: impl Fn(usize) -> T + Sync,
     make: impl Fn(&T, usize, usize) -> (Ray, u32, Chosen) + Sync,
 ) {
-    let RaySet { rays, hits, surfaces } = own;
+    let RaySet { rays, hits, surfaces, .. } = own;
     let runs = rays.par_chunks_mut(RUN).zip(hits.par_chunks_mut(RUN)).zip(surfaces.par_chunks_mut(RUN));
     runs.enumerate().with_min_len(1024 / RUN).for_each(|(run, ((rays, hits), surfaces))| {
         let shared = of_run(run * RUN);
@@ -57,7 +57,7 @@ fn for_each_new(own: &mut RaySet, make: impl Fn(usize) -> (Ray, u32, Chosen) + S
 
 /// Starts the hits of rays that came from outside: nothing found within their range.
 pub fn start_hits(own: &mut RaySet) {
-    let RaySet { rays, hits, surfaces } = own;
+    let RaySet { rays, hits, surfaces, .. } = own;
     for ((ray, hit), surface) in rays.iter().zip(hits).zip(surfaces) {
         (*hit, *surface) = start_hit(ray.t_max, NONE);
     }

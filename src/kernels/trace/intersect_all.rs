@@ -17,25 +17,58 @@ use crate::kernels::tiles::PairCounts;
 
 /// Of the rays of `work`; `SELECT`: with what is selected, but for culled pairs.
 pub fn intersect_all<const SELECT: bool>(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts) {
-    run_for_each_packet(set, bound, work, &IntersectAll::<SELECT> { bound, pairs });
+    // Nodes are counted as they are visited without.
+    let leading = if SELECT && !bound.count { leading(bound, set.rays.len()) } else { Vec::new() };
+    run_for_each_packet(set, bound, work, &IntersectAll::<SELECT> { bound, pairs, leading: &leading });
+}
+
+/// With fewer rays for each node of the top level, looking through all nodes costs more than it saves.
+const RAYS_A_NODE: usize = 4;
+
+/// Of each node of the top level the children that lead to a selected brick, a bit each. A ray meets
+/// and asks for nothing below others, so it need not walk there. Empty where there are too few rays for that to pay:
+/// then all may lead there.
+pub fn leading(bound: &Bound, rays: usize) -> Vec<u8> {
+    let nodes = &bound.scene.top8;
+    if nodes.len() > rays / RAYS_A_NODE {
+        return Vec::new();
+    }
+    let mut leading = vec![0u8; nodes.len()];
+    // Children lie behind their parents.
+    for (index, node) in nodes.iter().enumerate().rev() {
+        let inner = u32::from(node.inner_mask);
+        let leads = |slot: &u32| {
+            if inner & 1 << slot != 0 {
+                return leading[(node.child_base + inner_before(inner, *slot)) as usize] != 0;
+            }
+            let leaf = node.triangle_base + u32::from(node.meta[*slot as usize] & 31);
+            bound.is_selected(bound.brick_of(leaf))
+        };
+        let children = (0..8u32).filter(|&slot| node.meta[slot as usize] != 0);
+        leading[index] = children.filter(leads).fold(0, |bits, slot| bits | 1 << slot);
+    }
+    leading
 }
 
 struct IntersectAll<'a, const SELECT: bool> {
     bound: &'a Bound<'a>,
     pairs: &'a PairCounts,
+    leading: &'a [u8],
 }
 
 impl<const SELECT: bool> IntersectAll<'_, SELECT> {
     #[inline(always)]
     fn is_left_out(&self, tile: usize, leaf: u32) -> bool {
-        let Self { bound, pairs } = self;
+        let Self { bound, pairs, .. } = self;
         SELECT && (!bound.is_selected(bound.brick_of(leaf)) || pairs.is_culled(bound, tile, leaf))
     }
 }
 
 impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
+    const NARROWS: bool = SELECT;
+
     #[inline(always)]
-    fn takes(&self, slot: &Slot) -> bool {
+    fn takes(&self, slot: &mut Slot) -> bool {
         let bound = self.bound;
         let is_found = bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
         let is_left_out = SELECT && (is_found || !is_pending(slot.surface));
@@ -53,7 +86,8 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
         let mut next = Some((0, packets.packet.all()));
         loop {
             if let Some((index, rays)) = next.take() {
-                let group = top_group(isa, bound, &packets.packet, &place, (index, rays));
+                let children = self.leading.get(index as usize).map_or(u32::MAX, |&children| children.into());
+                let group = top_group(isa, bound, &packets.packet, &place, (index, children, rays));
                 packets.visits.nodes = packets.visits.nodes.wrapping_add(rays.count_ones());
                 if !put(&mut packets.top, &mut depth, group, &mut scratch.tally) {
                     break;

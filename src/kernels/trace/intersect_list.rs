@@ -38,8 +38,10 @@ impl IntersectList<'_> {
 }
 
 impl PacketKernel for IntersectList<'_> {
+    const NARROWS: bool = false;
+
     #[inline(always)]
-    fn takes(&self, slot: &Slot) -> bool {
+    fn takes(&self, slot: &mut Slot) -> bool {
         let (next, end) = self.run_of(slot.tile);
         next != end && slot.is_traced() && !(self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE)
     }

@@ -41,7 +41,8 @@ pub struct Column(pub [f32; RAYS]);
 pub struct Words(pub [u32; RAYS]);
 
 impl Column {
-    const ZERO: Self = Self([0.0; RAYS]);
+    /// Zeros.
+    pub const ZERO: Self = Self([0.0; RAYS]);
 
     /// The lanes of vector `number`.
     #[inline(always)]
@@ -86,7 +87,8 @@ impl Column {
 }
 
 impl Words {
-    const NONE: Self = Self([NONE; RAYS]);
+    /// Nothing of any ray.
+    pub const NONE: Self = Self([NONE; RAYS]);
 
     /// The lanes of vector `number`.
     #[inline(always)]
@@ -354,6 +356,16 @@ impl Packet {
             rays |= u64::from(isa.splat(near).less_equal(self.t.get(isa, v))) << (v * I::Wide::LANES);
         }
         rays & self.all()
+    }
+
+    /// Of `rays` those whose hits are not nearer than their distances in `near`.
+    #[inline(always)]
+    pub fn reaching_each<I: Isa>(&self, isa: I, near: &Column, rays: u64) -> u64 {
+        let mut reaching = 0;
+        for v in 0..self.vectors::<I>() {
+            reaching |= u64::from(near.get(isa, v).less_equal(self.t.get(isa, v))) << (v * I::Wide::LANES);
+        }
+        reaching & rays
     }
 
     /// Of `rays` those that take a leaf of the top level.

@@ -2,7 +2,7 @@
 //! tell, ray by ray.
 
 use super::node::UNIT;
-use super::packet::{Axes, Packet, RAYS, axes};
+use super::packet::{Axes, Column, Packet, RAYS, axes};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, most};
@@ -51,6 +51,38 @@ impl Packet {
     /// children of the mask that comes back; no ray enters another child that exists. `entered` holds zeros before.
     #[inline(always)]
     pub fn open<I: Isa>(&self, isa: I, node: &Node, place: &Place, rays: u64, entered: &mut [u64; 8]) -> u32 {
+        self.open_of(isa, (node, place, u32::MAX), rays, entered)
+    }
+
+    /// The same for the children of a mask alone.
+    #[inline(always)]
+    pub fn open_of<I: Isa>(&self, isa: I, what: (&Node, &Place, u32), rays: u64, entered: &mut [u64; 8]) -> u32 {
+        self.meet::<I, false>(isa, what, rays, entered, |_, _, _| {})
+    }
+
+    /// The same, and where: of a child that any ray enters, `near` holds
+    /// the distance of each ray of `rays`, as [`super::node::node_hits`] says.
+    #[inline(always)]
+    pub fn enter<I: Isa>(
+        &self,
+        isa: I,
+        what: (&Node, &Place, u32),
+        rays: u64,
+        (entered, near): (&mut [u64; 8], &mut [Column; 8]),
+    ) -> u32 {
+        self.meet::<I, true>(isa, what, rays, entered, |i, v, tn| near[i].set(v, tn))
+    }
+
+    /// [`Packet::open`] of the children of a mask; with `EACH` calls `keep` with child, vector and distances.
+    #[inline(always)]
+    fn meet<I: Isa, const EACH: bool>(
+        &self,
+        isa: I,
+        (node, place, children): (&Node, &Place, u32),
+        rays: u64,
+        entered: &mut [u64; 8],
+        mut keep: impl FnMut(usize, usize, I::Wide),
+    ) -> u32 {
         let is_negative = (self.flip >> 2 & 1) | (self.flip & 2) | (self.flip << 2 & 4);
         let bounds = &self.bounds;
         let [origin, step] = isa.grid(node);
@@ -85,13 +117,13 @@ impl Packet {
         let tf = three!(k => last[k] * isa.eight(scale_fast[k]) + isa.eight(planes[1][k]));
         let tn = tn[0].most(tn[1]).most(tn[2].most(isa.eight(bounds.t_min[0])));
         let tf = tf[0].least(tf[1]).least(tf[2].least(isa.eight(bounds.t[1])));
-        let some = tn.less_equal(tf) & present(node.meta);
+        let some = tn.less_equal(tf) & present(node.meta) & children;
         if some == 0 {
             return 0;
         }
         // Those that every ray enters. Rays from several points have planes of their own.
         let mut every = 0;
-        if bounds.is_point {
+        if bounds.is_point && !EACH {
             let tn = three!(k => first[k] * isa.eight(scale_fast[k]) + isa.eight(planes[4][k]));
             let tf = three!(k => last[k] * isa.eight(scale[k]) + isa.eight(planes[5][k]));
             let tn = tn[0].most(tn[1]).most(tn[2].most(isa.eight(bounds.t_min[1])));
@@ -138,6 +170,9 @@ impl Packet {
                 let n = three!(k => isa.splat(sides[0][k][i]) * scale[k] + near[k]);
                 let f = three!(k => isa.splat(sides[1][k][i]) * scale[k] + far[k]);
                 let (tn, tf) = (n[0].most(n[1]).most(n[2].most(t_min)), f[0].least(f[1]).least(f[2].least(t_max)));
+                if EACH {
+                    keep(i, v, tn);
+                }
                 let bits = u64::from(tn.less_equal(tf)) & lanes;
                 entered[i] |= bits << shift;
                 met |= u32::from(bits != 0) << i;

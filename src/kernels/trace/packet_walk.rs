@@ -2,7 +2,7 @@
 
 use super::flat_node::{FlatOpen, FlatStack, Sight};
 use super::leaf::BrickRay;
-use super::packet::Packet;
+use super::packet::{Column, Packet};
 use super::packet_flat::Sights;
 use super::packet_node::Place;
 use super::scratch::Scratch;
@@ -46,6 +46,30 @@ pub struct PacketScratch {
     open: FlatStack,
     /// Visits of all rays.
     pub visits: Visits,
+    /// What queries work with.
+    pub entries: Entries,
+}
+
+/// Where rays enter what they ask about.
+pub struct Entries {
+    /// Each child of a node.
+    pub children: [Column; 8],
+    /// The same of a brick's root,
+    pub root: [Column; 8],
+    /// and the nearest of these.
+    pub brick: Column,
+    /// Nodes of the top level that are left to be visited.
+    pub waiting: Vec<Waiting>,
+}
+
+/// A node that rays are to visit.
+pub struct Waiting {
+    /// Its number.
+    pub node: u32,
+    /// The rays.
+    pub rays: u64,
+    /// Where each enters it.
+    pub near: Column,
 }
 
 impl Default for PacketScratch {
@@ -53,22 +77,24 @@ impl Default for PacketScratch {
         let stack = [PacketGroup::default(); STACK_SIZE];
         let (packet, sights, visits) = (Packet::empty(), Sights::empty(), Visits::default());
         let open = [FlatOpen::default(); STACK_SIZE];
-        Self { packet, bricks: stack, top: stack, sights, open, visits }
+        let none = [Column::ZERO; 8];
+        let entries = Entries { children: none, root: none, brick: Column::ZERO, waiting: Vec::new() };
+        Self { packet, bricks: stack, top: stack, sights, open, visits, entries }
     }
 }
 
-/// The children of a node of the wide top level that `rays` of the packet enter.
+/// The children of a node of the wide top level, of a mask, that `rays` of the packet enter.
 #[inline(always)]
 pub fn top_group<I: Isa>(
     isa: I,
     bound: &Bound,
     packet: &Packet,
     place: &Place,
-    (base, rays): (u32, u64),
+    (base, children, rays): (u32, u32, u64),
 ) -> PacketGroup {
     let node = &bound.scene.top8[base as usize];
     let mut group = PacketGroup { group: Group { base, bits: 0 }, ..PacketGroup::default() };
-    let mut met = packet.open(isa, node, place, rays, &mut group.rays);
+    let mut met = packet.open_of(isa, (node, place, children), rays, &mut group.rays);
     while met != 0 {
         group.group.bits |= 0x8000_0000 >> (met.trailing_zeros() ^ packet.flip);
         met &= met - 1;

@@ -1,6 +1,7 @@
 //! How kernels run over the rays of a set: bands of rows in parallel, in each blocks of neighbours, ray by ray or in
 //! packets.
 
+use super::levels::is_pending;
 use super::node::octant;
 use super::packet::{Packet, RAYS};
 use super::packet_walk::PacketScratch;
@@ -10,6 +11,7 @@ use crate::kernels::layout::{Hit, Ray, Surface, T_INFINITE, TileList};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::{self, Isa};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Edge of the blocks of rays that one thread traces in a row.
 const BLOCK: usize = 8;
@@ -49,6 +51,8 @@ struct Task {
 /// A rectangle of rays that lies in one tile and in one band.
 struct Block {
     tile: usize,
+    /// The first row of its band in the set.
+    row: usize,
     /// First column.
     first: usize,
     columns: usize,
@@ -78,6 +82,37 @@ impl Block {
             }
         }
     }
+
+    /// The same of the rays whose bit is set, in the order of [`Self::for_each_place`].
+    #[inline(always)]
+    fn for_each_bit(&self, width: usize, square: usize, mut bits: u64, mut visit: impl FnMut(usize)) {
+        let across = self.columns.div_ceil(BLOCK);
+        let (first, row, end) =
+            (self.first + square % across * BLOCK, square / across * BLOCK, self.first + self.columns);
+        while bits != 0 {
+            let bit = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            let column = first + (bit >> 4 & 1) * BLOCK / 2 + (bit & 3);
+            let row = row + (bit >> 5) * BLOCK / 2 + (bit >> 2 & 3);
+            if row < self.rows && column < end {
+                visit(row * width + column);
+            }
+        }
+    }
+
+    /// The bit of a ray of the band within its square.
+    #[inline(always)]
+    fn bit_of(width: usize, at: usize) -> u64 {
+        let (x, y) = (at % width % BLOCK, at / width % BLOCK);
+        1 << ((y / 4 * 2 + x / 4) * 16 + y % 4 * 4 + x % 4)
+    }
+
+    /// The number of a square among those of all rows of `width`.
+    #[inline(always)]
+    fn number_of(&self, width: usize, square: usize) -> usize {
+        let across = self.columns.div_ceil(BLOCK);
+        (self.row / BLOCK + square / across) * width.div_ceil(BLOCK) + self.first / BLOCK + square % across
+    }
 }
 
 /// The rays of a band with what is written of them.
@@ -85,6 +120,8 @@ struct Band<'a> {
     rays: &'a [Ray],
     hits: &'a mut [Hit],
     surfaces: &'a mut [Surface],
+    /// [`RaySet::waiting`] of all bands.
+    waiting: &'a [AtomicU64],
 }
 
 impl Band<'_> {
@@ -116,18 +153,18 @@ fn for_each_block(
     // Tiles are powers of two of at least 8.
     let (rows, columns) = (rows.min(tile_edge), columns.min(tile_edge));
     let band = rows * width;
-    let RaySet { rays, hits, surfaces } = set;
+    let RaySet { rays, hits, surfaces, waiting } = set;
     let bands = rays.par_chunks(band).zip(hits.par_chunks_mut(band)).zip(surfaces.par_chunks_mut(band));
     bands.enumerate().for_each(|(number, ((rays, hits), surfaces))| {
         let mut task = Task::default();
         let row = number * rows;
         let rows = rays.len() / width;
-        let mut band = Band { rays, hits, surfaces };
+        let mut band = Band { rays, hits, surfaces, waiting };
         for first in (0..width).step_by(columns) {
             let tile = row / tile_edge * tiles_x + first / tile_edge;
             if work.includes(tile) {
                 let columns = columns.min(width - first);
-                visit(&mut task, &mut band, Block { tile, first, columns, rows });
+                visit(&mut task, &mut band, Block { tile, row, first, columns, rows });
             }
         }
         bound.counters.add(&task.scratch.tally);
@@ -149,8 +186,11 @@ pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn
 /// A kernel that rays of one octant run together, compiled for every instruction set. Implementations are always
 /// inlined, so that all of it is.
 pub trait PacketKernel: Sync {
-    /// Whether it does anything for a ray.
-    fn takes(&self, slot: &Slot) -> bool;
+    /// Whether it takes pending rays alone. [`RaySet::waiting`] is narrowed to those then.
+    const NARROWS: bool;
+
+    /// Whether it does anything for a ray together with others.
+    fn takes(&self, slot: &mut Slot) -> bool;
 
     /// Runs it for the rays of the packet, which are of the tile; what they find stays with them.
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize);
@@ -177,6 +217,7 @@ const LEAST_SQUARE: usize = 16;
 pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: &impl PacketKernel) {
     // Where there are many threads, each has its share of bands.
     let height = bound.params.height as usize;
+    narrow(set, bound, kernel);
     let of_thread = height / (BANDS * rayon::current_num_threads());
     let mut rows = PACKET_BLOCK;
     while rows > BLOCK && rows > of_thread {
@@ -185,6 +226,14 @@ pub fn run_for_each_packet(set: &mut RaySet, bound: &Bound, work: Work, kernel: 
     for_each_block(set, bound, work, [rows, BLOCK_RAYS / rows], |task, band, block| {
         bound.isa.run(OfBlock { bound, kernel, task, band, block });
     });
+}
+
+/// Has the words of a set be there for a kernel that narrows them.
+fn narrow<K: PacketKernel>(set: &mut RaySet, bound: &Bound, _: &K) {
+    if K::NARROWS && set.waiting.is_empty() {
+        let squares = (bound.params.width as usize).div_ceil(BLOCK) * (bound.params.height as usize).div_ceil(BLOCK);
+        set.waiting.resize_with(squares, || AtomicU64::new(u64::MAX));
+    }
 }
 
 /// A kernel over a block.
@@ -283,13 +332,23 @@ impl Groups {
         (self.square, self.counts, self.taken) = (0, [0; CELLS], 0);
     }
 
+    /// Has a ray be of the group, if `kernel` does anything for it.
+    #[inline(always)]
+    fn look(&mut self, kernel: &impl PacketKernel, slot: &mut Slot, at: usize, octants: &mut u32) {
+        if kernel.takes(slot) {
+            self.places[self.count % RAYS] = at as u32;
+            *octants |= 1 << (octant(slot.ray.direction) % 8);
+            self.count += 1;
+        }
+    }
+
     /// Takes the next group of rays for which `kernel` does anything. False: there is none.
     #[inline(always)]
-    fn next<I: Isa>(
+    fn next<I: Isa, K: PacketKernel>(
         &mut self,
         isa: I,
         bound: &Bound,
-        kernel: &impl PacketKernel,
+        kernel: &K,
         band: &mut Band,
         block: &Block,
     ) -> bool {
@@ -297,15 +356,26 @@ impl Groups {
         while self.square < block.squares() {
             let mut octants = 0u32;
             self.count = 0;
-            block.for_each_place(width, self.square, |at| {
-                band.prefetch(isa, at + BLOCK);
-                let slot = band.slot(block.tile, at);
-                if kernel.takes(&slot) {
-                    self.places[self.count % RAYS] = at as u32;
-                    octants |= 1 << (octant(slot.ray.direction) % 8);
-                    self.count += 1;
+            if K::NARROWS {
+                let word = &band.waiting[block.number_of(width, self.square)];
+                let bits = word.load(Ordering::Relaxed);
+                let mut left = 0;
+                block.for_each_bit(width, self.square, bits, |at| {
+                    let mut slot = band.slot(block.tile, at);
+                    if is_pending(slot.surface) {
+                        left |= Block::bit_of(width, at);
+                        self.look(kernel, &mut slot, at, &mut octants);
+                    }
+                });
+                if left != bits {
+                    word.store(left, Ordering::Relaxed);
                 }
-            });
+            } else {
+                block.for_each_place(width, self.square, |at| {
+                    band.prefetch(isa, at + BLOCK);
+                    self.look(kernel, &mut band.slot(block.tile, at), at, &mut octants);
+                });
+            }
             self.square += 1;
             if octants.is_power_of_two() && self.count >= LEAST_SQUARE {
                 self.octant = octants.trailing_zeros() as usize;

@@ -331,7 +331,7 @@ pub fn seen(bound: &Bound, tables: &Tables, seen: &RaySet) {
 /// Makes a block of the rays of a group.
 pub fn rays(bound: &Bound, tables: &Tables, set: &mut RaySet) {
     let own: &DvfOwn = bound.own();
-    let RaySet { rays, hits, surfaces } = set;
+    let RaySet { rays, hits, surfaces, .. } = set;
     let all = rays.par_iter_mut().zip(hits.par_iter_mut()).zip(surfaces.par_iter_mut());
     all.enumerate().with_min_len(RUN).for_each(|(index, ((ray, hit), surface))| {
         let is_made = is_made(tables, own, index);
@@ -376,7 +376,7 @@ fn note(tables: &Tables, first: u32, index: usize, waits: bool) {
 /// Enters what a block's rays met into the masks of the cells that they start in; those that wait are noted and ended.
 pub fn write(bound: &Bound, tables: &Tables, set: &mut RaySet) {
     let own: &DvfOwn = bound.own();
-    let RaySet { rays, hits, surfaces } = set;
+    let RaySet { rays, hits, surfaces, .. } = set;
     let grid = tables.grid;
     let words = mask::words(grid.octahedral);
     let first = own.next;

@@ -79,7 +79,7 @@ pub fn roma_draw(
     let is_turned = !bound.has(PARAM_ANY_HIT);
     let Pixels { gbuffers, throughput, .. } = pixels;
     let gbuffer = &gbuffers[shaded];
-    let RaySet { rays, hits, surfaces } = own;
+    let RaySet { rays, hits, surfaces, .. } = own;
     let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks_mut(RUN));
     all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();

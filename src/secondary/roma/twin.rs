@@ -469,7 +469,7 @@ pub fn roma_trace(
     let (p, own) = (bound.params, bound.own::<RomaOwn>());
     let of = Maps::of(bound, buffers)?;
     let (is_far, is_sifted) = (own.part == ROMA_FAR, own.part == ROMA_SIFT);
-    let RaySet { rays, hits, surfaces } = set;
+    let RaySet { rays, hits, surfaces, .. } = set;
     let all = hits.par_chunks_mut(RUN).zip(surfaces.par_chunks_mut(RUN)).zip(rays.par_chunks(RUN));
     all.enumerate().for_each(|(run, ((hits, surfaces), rays))| {
         let mut tally = Tally::default();
