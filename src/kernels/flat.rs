@@ -1,8 +1,8 @@
-//! Bricks in the form that the processor walks fastest: boxes as plain numbers, the vertices of triangles side by side.
+//! Bricks in the form that the processor walks fastest: all boxes on one grid, the vertices of triangles side by side.
 //!
-//! Packed nodes are decoded and seen from a ray one by one. Here what a ray adds to a box is the same in all of a
-//! brick, and no index is looked up. Boxes are those of the packed nodes, and nodes and triangles have the same
-//! numbers. Triangles are tested by the same operations, so hits are the same, bit for bit.
+//! Packed nodes have grids of their own, which are seen from a ray one by one. Here what a ray makes of the grid is the
+//! same in all of a brick, and no index is looked up. Boxes are those of the packed nodes, up to a step of the grid, and
+//! nodes and triangles have the same numbers. Triangles are tested by the same operations, so hits are the same, bit for bit.
 
 use super::vector::Vec3;
 use bricks::{BRICK_WIDE, Brick, Node};
@@ -10,23 +10,32 @@ use bricks::{BRICK_WIDE, Brick, Node};
 /// Triangles of a block.
 pub const BLOCK: usize = 8;
 
-/// A node. It fills four lines of a processor's cache.
+/// A node. It fills two lines of a processor's cache, which are brought near together.
 #[derive(Clone, Copy)]
-#[repr(C, align(64))]
+#[repr(C, align(128))]
 pub struct FlatNode {
-    /// Lower bounds of the children by axes, and upper ones, device units of the object relative to the brick's origin;
-    /// of those that do not exist, what no ray enters.
-    pub bounds: [[[f32; 8]; 3]; 2],
-    /// The triangles of each child that is a leaf, a bit each from `triangle_base` on.
-    pub triangles: [u32; 8],
+    /// Lower bounds of the children by axes, and upper ones, steps of the brick's grid; of those that do not exist,
+    /// zeros.
+    pub bounds: [[[u16; 8]; 3]; 2],
+    /// As of [`Node`]; it tells the triangles of each child that is a leaf.
+    pub meta: [u8; 8],
     /// As of [`Node`].
     pub child_base: u32,
     /// As of [`Node`].
     pub triangle_base: u32,
     /// As of [`Node`].
-    pub inner_mask: u32,
+    pub inner_mask: u8,
     /// The children that exist, a bit each.
-    pub present: u32,
+    pub present: u8,
+}
+
+/// The grid that the bounds of a brick lie on, by axes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Grid {
+    /// Where it begins, device units of the object relative to the brick's origin.
+    pub origin: Vec3,
+    /// Its steps, powers of two.
+    pub step: Vec3,
 }
 
 /// Triangles that follow each other.
@@ -45,8 +54,8 @@ pub struct FlatBrick {
     pub nodes: Vec<FlatNode>,
     /// All triangles; what the last holds beside them is of no meaning.
     pub blocks: Vec<FlatBlock>,
-    /// Greatest magnitude of a bound by axis.
-    pub extent: Vec3,
+    /// What the nodes' bounds lie on.
+    pub grid: Grid,
 }
 
 /// `x` in f32, rounded down.
@@ -55,38 +64,83 @@ fn below(x: f64) -> f32 {
     if f64::from(near) <= x { near } else { near.next_down() }
 }
 
+/// Bounds of a child of a node by axes, lower and upper, device units of the object relative to the brick's origin.
+fn bounds_of(node: &Node, slot: usize) -> [[f64; 2]; 3] {
+    [0, 1, 2].map(|k| {
+        let step = f64::from(f32::from_bits(u32::from(node.exponent[k]) << 23));
+        let plane = |q: u8| f64::from(node.origin[k]) + f64::from(q) * step;
+        [plane(node.lo[k][slot]), plane(node.hi[k][slot])]
+    })
+}
+
+/// The children of a node that exist.
+fn slots(node: &Node) -> impl Iterator<Item = usize> {
+    (0..8).filter(|&slot| node.meta[slot] != 0)
+}
+
+impl Grid {
+    /// Steps that it has.
+    pub const STEPS: f32 = 65535.0;
+
+    /// The finest that holds all children of `nodes`.
+    fn new(nodes: &[Node]) -> Self {
+        let mut grid = Self::default();
+        for k in 0..3 {
+            let all = nodes.iter().flat_map(|node| slots(node).map(move |slot| bounds_of(node, slot)[k]));
+            let [low, high] = all.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], [x, y]| [l.min(x), h.max(y)]);
+            grid.origin[k] = if low <= high { below(low) } else { 0.0 };
+            let size = (high - f64::from(grid.origin[k])).max(0.0);
+            // The least exponent of a number that is not denormal, or the next that suffices.
+            grid.step[k] = f32::MIN_POSITIVE;
+            while f64::from(grid.step[k]) * f64::from(Self::STEPS) < size {
+                grid.step[k] *= 2.0;
+            }
+        }
+        grid
+    }
+
+    /// Steps up to `x` along an axis, rounded down and up.
+    fn steps(&self, k: usize, x: f64) -> [u16; 2] {
+        let steps = (x - f64::from(self.origin[k])) / f64::from(self.step[k]);
+        // Casts saturate; all bounds lie within.
+        [steps.floor() as u16, steps.ceil() as u16]
+    }
+}
+
 impl FlatNode {
     /// The same as `of`.
-    fn new(of: &Node) -> Self {
+    fn new(of: &Node, grid: &Grid) -> Self {
         let mut node = Self {
-            bounds: [[[f32::INFINITY; 8]; 3], [[f32::NEG_INFINITY; 8]; 3]],
-            triangles: [0; 8],
+            bounds: [[[0; 8]; 3]; 2],
+            meta: of.meta,
             child_base: of.child_base,
             triangle_base: of.triangle_base,
-            inner_mask: u32::from(of.inner_mask),
+            inner_mask: of.inner_mask,
             present: 0,
         };
-        for slot in (0..8).filter(|&slot| of.meta[slot] != 0) {
+        for slot in slots(of) {
             node.present |= 1 << slot;
-            for k in 0..3 {
-                let step = f64::from(f32::from_bits(u32::from(of.exponent[k]) << 23));
-                let plane = |q: u8| f64::from(of.origin[k]) + f64::from(q) * step;
-                node.bounds[0][k][slot] = below(plane(of.lo[k][slot]));
-                node.bounds[1][k][slot] = -below(-plane(of.hi[k][slot]));
-            }
-            if node.inner_mask >> slot & 1 == 0 {
-                let what = u32::from(of.meta[slot]);
-                node.triangles[slot] = (what >> 5) << (what & 31);
+            for (k, [low, high]) in bounds_of(of, slot).into_iter().enumerate() {
+                node.bounds[0][k][slot] = grid.steps(k, low)[0];
+                node.bounds[1][k][slot] = grid.steps(k, high)[1];
             }
         }
         node
+    }
+
+    /// The triangles of a child that is a leaf, a bit each from `triangle_base` on.
+    #[inline(always)]
+    pub fn triangles_of(&self, slot: usize) -> u32 {
+        let what = u32::from(self.meta[slot % 8]);
+        (what >> 5) << (what & 31)
     }
 }
 
 impl FlatBrick {
     /// The brick of `nodes` and `triangles`: their vertices, and ids.
     pub fn new(nodes: &[Node], triangles: impl ExactSizeIterator<Item = ([Vec3; 3], u32)>) -> Self {
-        let nodes: Vec<FlatNode> = nodes.iter().map(FlatNode::new).collect();
+        let grid = Grid::new(nodes);
+        let nodes = nodes.iter().map(|node| FlatNode::new(node, &grid)).collect();
         let mut blocks = vec![FlatBlock::default(); triangles.len().div_ceil(BLOCK)];
         for (number, (vertices, id)) in triangles.enumerate() {
             let (block, lane) = (&mut blocks[number / BLOCK], number % BLOCK);
@@ -97,12 +151,7 @@ impl FlatBrick {
             }
             block.ids[lane] = id;
         }
-        let mut extent = [0.0f32; 3];
-        for (k, extent) in extent.iter_mut().enumerate() {
-            let bounds = nodes.iter().flat_map(|node| node.bounds.iter().flat_map(move |side| side[k]));
-            *extent = bounds.filter(|x| x.is_finite()).fold(0.0, |most, x| most.max(x.abs()));
-        }
-        Self { nodes, blocks, extent }
+        Self { nodes, blocks, grid }
     }
 
     /// Bytes that it takes of a brick. `None`: vertices have too many bits for this form.
@@ -139,7 +188,7 @@ mod tests {
     #[test]
     fn boxes_and_triangles_are_those_of_the_packed_brick() {
         let file = probe::scene().unwrap();
-        let (mut made, mut apart) = (0, 0);
+        let (mut made, mut apart, mut finest) = (0, 0, 0.0f64);
         for (number, record) in (0..).zip(&file.resident().bricks) {
             let payload = Payload::Geometry(number);
             let mut words = vec![0u32; file.span(payload).bytes as usize / 4];
@@ -158,19 +207,25 @@ mod tests {
             }
             for (own, of) in flat.nodes.iter().zip(view.nodes) {
                 assert_eq!((own.child_base, own.triangle_base), (of.child_base, of.triangle_base));
+                assert_eq!(usize::from(own.present), slots(of).fold(0, |bits, slot| bits | 1 << slot));
                 for slot in (0..8).filter(|&slot| of.meta[slot] != 0) {
                     for k in 0..3 {
                         let step = (f64::from(of.exponent[k]) - 127.0).exp2();
                         let plane = |q: u8| f64::from(of.origin[k]) + f64::from(q) * step;
                         let (low, high) = (plane(of.lo[k][slot]), plane(of.hi[k][slot]));
-                        let [below, above] = own.bounds.map(|side| f64::from(side[k][slot]));
+                        let Grid { origin, step } = flat.grid;
+                        let of_grid = |q: u16| f64::from(origin[k]) + f64::from(q) * f64::from(step[k]);
+                        let [below, above] = own.bounds.map(|side| of_grid(side[k][slot]));
                         assert!(below <= low && high <= above, "{below} {low} {high} {above}");
-                        assert!(low - below + above - high <= 1e-6 * (low.abs() + high.abs()), "no wider");
+                        let most = f64::from(step[k]);
+                        assert!(low - below < most && above - high < most, "wider by more than a step");
                         apart += usize::from(below != above);
+                        finest = finest.max(above.max(-below) / most);
                     }
                 }
             }
         }
+        assert!(finest > 16384.0, "grids have up to {finest} steps in use");
         assert!(made > 1 && apart > 100, "{made} bricks, {apart} boxes");
     }
 }

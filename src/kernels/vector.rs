@@ -33,7 +33,7 @@ pub fn cross(a: Vec3, b: Vec3) -> Vec3 {
 #[inline(always)]
 pub fn normalize(v: Vec3) -> Vec3 {
     let length = dot(v, v).sqrt();
-    v.map(|x| x / length)
+    each(|k| v[k] / length)
 }
 
 /// WGSL's `mix` of two numbers.

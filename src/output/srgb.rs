@@ -32,24 +32,41 @@ static THRESHOLDS: LazyLock<[f32; 256]> = LazyLock::new(|| {
     })
 });
 
-fn by_table(thresholds: &[f32; 256], linear: f32) -> u8 {
-    // The number of thresholds passed, bit by bit; a NaN passes none.
-    let mut passed = 0;
-    for bit in [128, 64, 32, 16, 8, 4, 2, 1] {
-        passed |= if linear >= thresholds[passed | bit] { bit } else { 0 };
+/// Cells of an octave of linear values: no two thresholds lie in one.
+const CELLS: u32 = 256;
+/// Bits of a value below its cell.
+const BELOW: u32 = 23 - CELLS.ilog2();
+/// The least value of the first cell, before the first threshold: 2^-13.
+const FIRST: u32 = (127 - 13) << 23;
+
+/// Of each cell up to 1 how many thresholds a value passes before it.
+static PASSED: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let thresholds = &*THRESHOLDS;
+    let cells = (FIRST >> BELOW..1f32.to_bits() >> BELOW).map(|cell| f32::from_bits(cell << BELOW));
+    cells.map(|least| (1..256).filter(|&k| least >= thresholds[k]).count() as u8).collect()
+});
+
+fn by_table(thresholds: &[f32; 256], passed: &[u8], linear: f32) -> u8 {
+    if linear >= 1.0 {
+        return 255;
     }
-    passed as u8
+    // Negative values and what is no number lie before the first cell, too.
+    let within = if linear > 0.0 { linear.to_bits().saturating_sub(FIRST) } else { 0 };
+    let before = passed[(within >> BELOW) as usize];
+    let passes_next = thresholds.get(usize::from(before) + 1).is_some_and(|&next| linear >= next);
+    before + u8::from(passes_next)
 }
 
 /// The sRGB value, 0 to 255, of a linear value: clamped to 0..=1, rounded to nearest; NaN is black.
 pub fn srgb8(linear: f32) -> u8 {
-    by_table(&THRESHOLDS, linear)
+    by_table(&THRESHOLDS, &PASSED, linear)
 }
 
 /// [`srgb8`] of whole pixels.
 pub fn pixels(linear: &[[f32; 3]]) -> Vec<[u8; 3]> {
-    let thresholds = &*THRESHOLDS;
-    linear.par_iter().with_min_len(4096).map(|pixel| pixel.map(|x| by_table(thresholds, x))).collect()
+    let (thresholds, passed) = (&*THRESHOLDS, &PASSED[..]);
+    let bytes = |&[r, g, b]: &[f32; 3]| [r, g, b].map(|x| by_table(thresholds, passed, x));
+    linear.par_iter().with_min_len(4096).map(bytes).collect()
 }
 
 #[cfg(test)]

@@ -37,7 +37,7 @@ fn octahedral(word: u32) -> Vec3 {
 /// Normals and tangents of vertices are unit vectors in the world before they are interpolated; see the kernel.
 fn unit_or_zero(v: Vec3) -> Vec3 {
     let inverse = 1.0 / most(dot(v, v), 1.0e-30).sqrt();
-    v.map(|x| x * inverse)
+    each(|k| v[k] * inverse)
 }
 
 /// Of the surface that has such unit normals at the corners of a triangle of half this area; see the kernel.
@@ -77,6 +77,7 @@ pub fn resolve(
     materials: &[Material],
     attributes: &[AttributeView],
 ) {
+    let waits: Vec<u32> = materials.iter().map(waits_of).collect();
     let resolved = |index: usize, g: &mut GBuffer, more: Option<&mut More>| {
         let surface = &seen.surfaces[index];
         if surface.leaf == NONE || g.state != 0 {
@@ -84,8 +85,7 @@ pub fn resolve(
         }
         let brick = bound.brick_of(surface.leaf);
         if bound.slots[brick].state & STATE_ATTRIBUTES != 0 {
-            let of_hit;
-            (*g, of_hit) = read(bound, seen, index, materials, &attributes[brick]);
+            let of_hit = read(bound, seen, index, (materials, &waits), &attributes[brick], g);
             if let (Some(more), Some(of_hit)) = (more, of_hit) {
                 *more = of_hit;
             }
@@ -100,21 +100,27 @@ pub fn resolve(
     }
 }
 
-/// What a hit shows, and its further textures where it has some.
+/// What hits of a material wait for: its textures, as bits of a state.
+fn waits_of(material: &Material) -> u32 {
+    let textures = (0..).zip(material.textures()).filter(|(_, texture)| *texture != NONE);
+    textures.fold(0, |bits, (place, _)| bits | 1 << (GBUFFER_FIRST + place))
+}
+
+/// What a hit shows, to `g`. Returns its further textures where it has some. `waits` is [`waits_of`] all materials.
 fn read(
     bound: &Bound,
     seen: &RaySet,
     index: usize,
-    materials: &[Material],
+    (materials, waits): (&[Material], &[u32]),
     attributes: &AttributeView,
-) -> (GBuffer, Option<More>) {
+    g: &mut GBuffer,
+) -> Option<More> {
     let surface = &seen.surfaces[index];
     let word = attributes.surfaces[surface.triangle as usize];
     let material = &materials[(word & SURFACE_MATERIAL) as usize];
     let rotation = word >> SURFACE_ROTATION_SHIFT;
     let hit = &seen.hits[index];
     let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-    let (mut normal, mut uv, mut color) = ([0.0; 3], [0.0; 2], [0.0; 4]);
     let corners = attributes.corners(surface.triangle);
     let instance = bound.scene.leaves[surface.leaf as usize].instance;
     let place = &bound.scene.instances[instance as usize];
@@ -125,48 +131,50 @@ fn read(
         let n = octahedral(word);
         if is_stretched { unit_or_zero(turned(n)) } else { n }
     };
+    let blend = |a: f32, b: f32, c: f32| 0.0 + weights[0] * a + weights[1] * b + weights[2] * c;
+    let [a, b, c] = &corners;
     // Most triangles are flat, and white.
-    let is_flat = corners.iter().all(|v| v.normal == corners[0].normal);
-    let normals = if is_flat { [unpacked(corners[0].normal); 3] } else { corners.map(|v| unpacked(v.normal)) };
-    let is_white = corners.iter().all(|v| v.color == u32::MAX);
-    for ((weight, v), n) in weights.into_iter().zip(&corners).zip(&normals) {
-        let c = if is_white { [1.0; 4] } else { unpack4x8unorm(v.color) };
-        normal = each(|k| normal[k] + weight * n[k]);
-        uv = [0, 1].map(|k| uv[k] + weight * v.uv[k]);
-        color = [0, 1, 2, 3].map(|k| color[k] + weight * c[k]);
-    }
+    let is_flat = a.normal == b.normal && a.normal == c.normal;
+    let first = unpacked(a.normal);
+    let (normal, curvature) = if is_flat {
+        (each(|k| blend(first[k], first[k], first[k])), 0.0)
+    } else {
+        let (second, third) = (unpacked(b.normal), unpacked(c.normal));
+        let normal = each(|k| blend(first[k], second[k], third[k]));
+        (normal, curvature_of([first, second, third], surface.area))
+    };
+    let color = if a.color & b.color & c.color == u32::MAX {
+        [blend(1.0, 1.0, 1.0); 3]
+    } else {
+        let [a, b, c] = [a, b, c].map(|v| unpack4x8unorm(v.color));
+        each(|k| blend(a[k], b[k], c[k]))
+    };
     let mut n = if is_stretched { normal } else { turned(normal) };
     let size = dot(n, n);
     // No normals, normals that cancel, and normals turned away from the side that was hit give way to the geometric
     // one.
     let inverse = 1.0 / most(size, 1.0e-30).sqrt();
-    n = if size > 1.0e-12 { n.map(|x| x * inverse) } else { surface.normal };
+    n = if size > 1.0e-12 { each(|k| n[k] * inverse) } else { surface.normal };
     let is_turned = dot(n, surface.normal) < 0.0;
     if is_turned {
-        n = n.map(|x| -x);
+        n = each(|k| -n[k]);
     }
-    let base = [0, 1, 2, 3].map(|k| material.base_color[k] * color[k]);
     // Source vertex (i + rotation) mod 3 was stored as vertex i.
     let source = |i: u32| weights[((i + 3 - rotation) % 3) as usize];
-    let mut g = GBuffer {
-        albedo: xyz(base),
-        state: GBUFFER_READ,
+    *g = GBuffer {
+        albedo: each(|k| material.base_color[k] * color[k]),
+        state: GBUFFER_READ | waits[(word & SURFACE_MATERIAL) as usize],
         normal: n,
         material: word & SURFACE_MATERIAL,
         emission: material.emission,
         weights: [source(1), source(2)],
-        uv,
+        uv: [blend(a.uv[0], b.uv[0], c.uv[0]), blend(a.uv[1], b.uv[1], c.uv[1])],
         occlusion: 1.0,
         metallic: material.metallic,
         roughness: material.roughness,
-        curvature: if is_flat { 0.0 } else { curvature_of(normals, surface.area) },
+        curvature,
         ..GBuffer::default()
     };
-    for (place, texture) in (0..).zip(material.textures()) {
-        if texture != NONE {
-            g.state |= 1 << (GBUFFER_FIRST + place);
-        }
-    }
     if g.state != GBUFFER_READ || material.flags & (MATERIAL_ANISOTROPIC | MATERIAL_MORE) != 0 {
         let footprint = |uvs| footprint_of(bound.params, &seen.rays[index], hit.t, surface, uvs);
         g.footprint = footprint(corners.map(|v| v.uv));
@@ -197,9 +205,9 @@ fn read(
             g.state &= !(1 << (GBUFFER_FIRST + NORMAL as u32));
         }
     }
-    let more = more::start(&g, materials, n);
+    let more = more::start(g, materials, n);
     if g.state == GBUFFER_READ {
-        settle(&mut g, material.flags);
+        settle(g, material.flags);
     }
     if is_turned {
         g.state |= GBUFFER_BACK;
@@ -207,7 +215,7 @@ fn read(
     if material.flags & MATERIAL_REFRACTS != 0 && bound.has(PARAM_REFRACT) {
         g.state |= GBUFFER_REFRACTS;
     }
-    (g, more)
+    more
 }
 
 #[cfg(test)]

@@ -2,16 +2,16 @@
 
 use super::node::{FramedRay, UNIT};
 use super::walk_brick::{Group, OpenedNode, STACK_SIZE};
-use crate::kernels::flat::{FlatBrick, FlatNode};
+use crate::kernels::flat::{FlatBrick, FlatNode, Grid};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, each, most3};
 
-/// What a ray adds to all boxes of a brick: distances are bound * `inverse` + `near`, and the same with `far`.
+/// What a ray makes of the grid of a brick: distances are steps * `scale` + `near`, and the same with `far`.
 #[derive(Clone, Copy, Default)]
 pub struct Sight {
-    /// Of the direction.
-    pub inverse: Vec3,
+    /// A step.
+    pub scale: Vec3,
     /// Of the padded bounds that are near.
     pub near: Vec3,
     /// Of the others.
@@ -21,21 +21,21 @@ pub struct Sight {
 }
 
 impl Sight {
-    /// Of a ray in a frame in which the brick lies at an offset. The padding is that of [`super::node::NodeFrame`], for
-    /// the farthest of the brick's bounds: of a distance m to them and an offset p, distances are off by less than
-    /// 4 m + p units, fused or not, and those of triangles reach by 36 m beyond their boxes ([`crate::math::exact`]).
+    /// Of a ray in a frame in which the brick lies at an offset: [`super::node::NodeFrame`] of the brick's grid. Of a
+    /// distance m to its farthest bound and an offset p of its origin, distances are off by less than 4 m + p units,
+    /// fused or not, and those of triangles reach by 36 m beyond their boxes ([`crate::math::exact`]).
     #[inline(always)]
     pub fn new(ray: &FramedRay, brick: &FlatBrick, offset_high: Vec3, offset_low: Vec3) -> Self {
-        let at = each(|k| offset_high[k] + offset_low[k]);
+        let Grid { origin, step } = brick.grid;
+        let at = each(|k| (origin[k] + offset_high[k]) + offset_low[k]);
         let w = each(|k| at[k] - ray.origin[k]);
-        let m = most3(each(|k| w[k].abs() + brick.extent[k]));
-        let delta =
-            each(|k| 64.0 * UNIT * m + 4.0 * UNIT * (at[k].abs() + brick.extent[k]) + 2.0 * UNIT * offset_low[k].abs());
+        let m = most3(each(|k| w[k].abs() + Grid::STEPS * step[k]));
+        let delta = each(|k| 64.0 * UNIT * m + 4.0 * UNIT * at[k].abs() + 2.0 * UNIT * offset_low[k].abs());
         let inverse = ray.frame.inv;
         let side = inverse.map(|i| usize::from(i < 0.0));
         let signed = each(|k| if side[k] != 0 { -delta[k] } else { delta[k] });
         Self {
-            inverse,
+            scale: each(|k| step[k] * inverse[k]),
             near: each(|k| (w[k] - signed[k]) * inverse[k]),
             far: each(|k| (w[k] + signed[k]) * inverse[k]),
             side,
@@ -53,12 +53,12 @@ impl Sight {
         (t_min, t_max): (f32, f32),
         open: &mut FlatOpen,
     ) -> Group {
-        let inverse = three!(k => isa.eight(self.inverse[k]));
+        let scale = three!(k => isa.eight(self.scale[k]));
         let near = three!(k => {
-            isa.load_eight(&node.bounds[self.side[k]][k]).times_plus(inverse[k], isa.eight(self.near[k]))
+            isa.steps(&node.bounds[self.side[k]][k]).times_plus(scale[k], isa.eight(self.near[k]))
         });
         let far = three!(k => {
-            isa.load_eight(&node.bounds[1 - self.side[k]][k]).times_plus(inverse[k], isa.eight(self.far[k]))
+            isa.steps(&node.bounds[1 - self.side[k]][k]).times_plus(scale[k], isa.eight(self.far[k]))
         });
         let near = near[0].most(near[1]).most(near[2].most(isa.eight(t_min)));
         let far = far[0].least(far[1]).least(far[2].least(isa.eight(t_max)));
@@ -116,15 +116,16 @@ impl FlatNode {
     /// What is met of it where children are entered, a bit each.
     #[inline(always)]
     pub fn opened(&self, entered: u32, flip: u32) -> OpenedNode {
-        let inner = entered & self.inner_mask;
-        let mut leaves = entered & self.present & !self.inner_mask;
+        let (inner_mask, present) = (u32::from(self.inner_mask), u32::from(self.present));
+        let inner = entered & inner_mask;
+        let mut leaves = entered & present & !inner_mask;
         let mut triangles = 0;
         while leaves != 0 {
-            triangles |= self.triangles[leaves.trailing_zeros() as usize % 8];
+            triangles |= self.triangles_of(leaves.trailing_zeros() as usize);
             leaves &= leaves - 1;
         }
         OpenedNode {
-            children: Group { base: self.child_base, bits: by_priority(inner, flip) << 24 | self.inner_mask },
+            children: Group { base: self.child_base, bits: by_priority(inner, flip) << 24 | inner_mask },
             triangles: Group { base: self.triangle_base, bits: triangles },
         }
     }

@@ -4,7 +4,7 @@
 use super::flat_node::Sight;
 use super::node::UNIT;
 use super::packet::{Column, Packet, RAYS};
-use crate::kernels::flat::{FlatBrick, FlatNode};
+use crate::kernels::flat::{FlatBrick, FlatNode, Grid};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, each, most, most3};
@@ -13,14 +13,16 @@ use crate::kernels::vector::{Vec3, each, most, most3};
 pub struct Sights {
     /// Whether those of single rays have been made, which not every brick needs.
     is_made: bool,
+    scale: [Column; 3],
     near: [Column; 3],
     far: [Column; 3],
     /// What the ray that meets them first adds to bounds that are near, and what the one that leaves them last does to
     /// the others, before both are divided by directions.
     first: Vec3,
     last: Vec3,
+    step: Vec3,
     side: [usize; 3],
-    /// Where the brick's origin lies, and the part of the padding that depends on no ray.
+    /// Where the grid's origin lies, and the part of the padding that depends on no ray.
     at: Vec3,
     pad: Vec3,
 }
@@ -29,53 +31,66 @@ impl Sights {
     /// Of no brick.
     pub fn empty() -> Self {
         let (none, zero) = ([Column([0.0; RAYS]); 3], [0.0; 3]);
-        Self { is_made: false, near: none, far: none, first: zero, last: zero, side: [0; 3], at: zero, pad: zero }
+        Self {
+            is_made: false,
+            scale: none,
+            near: none,
+            far: none,
+            first: zero,
+            last: zero,
+            step: zero,
+            side: [0; 3],
+            at: zero,
+            pad: zero,
+        }
     }
 
     /// Begins with a brick at an offset. As [`Sight::new`] says of every ray; each operation is monotonic in f32, too.
     #[inline(always)]
     pub fn begin(&mut self, packet: &Packet, brick: &FlatBrick, (offset_high, offset_low): (Vec3, Vec3)) {
         let bounds = &packet.bounds;
-        let at = each(|k| offset_high[k] + offset_low[k]);
-        let pad = each(|k| 4.0 * UNIT * (at[k].abs() + brick.extent[k]) + 2.0 * UNIT * offset_low[k].abs());
+        let Grid { origin, step } = brick.grid;
+        let at = each(|k| (origin[k] + offset_high[k]) + offset_low[k]);
+        let pad = each(|k| 4.0 * UNIT * at[k].abs() + 2.0 * UNIT * offset_low[k].abs());
         let (low, high) = (each(|k| at[k] - bounds.origin[1][k]), each(|k| at[k] - bounds.origin[0][k]));
-        let m = most3(each(|k| most(low[k].abs(), high[k].abs()) + brick.extent[k]));
+        let m = most3(each(|k| most(low[k].abs(), high[k].abs()) + Grid::STEPS * step[k]));
         let side = [2, 1, 0].map(|bit| (packet.flip >> bit & 1) as usize);
         for k in 0..3 {
             let delta = 64.0 * UNIT * m + pad[k];
             let ends = [low[k] - delta, high[k] + delta];
             (self.first[k], self.last[k]) = (ends[side[k]], ends[1 - side[k]]);
         }
-        (self.is_made, self.side, self.at, self.pad) = (false, side, at, pad);
+        (self.is_made, self.side, self.at, self.pad, self.step) = (false, side, at, pad, step);
     }
 
     /// Makes those of single rays, unless they have been made.
     #[inline(always)]
-    pub fn make<I: Isa>(&mut self, isa: I, packet: &Packet, brick: &FlatBrick) {
+    pub fn make<I: Isa>(&mut self, isa: I, packet: &Packet) {
         if std::mem::replace(&mut self.is_made, true) {
             return;
         }
         for v in 0..packet.vectors::<I>() {
             let inverse = three!(k => packet.inverse[k].get(isa, v));
             let w = three!(k => isa.splat(self.at[k]) - packet.origin[k].get(isa, v));
-            let size = three!(k => w[k].abs() + isa.splat(brick.extent[k]));
+            let size = three!(k => w[k].abs() + isa.splat(Grid::STEPS * self.step[k]));
             let m = isa.splat(64.0 * UNIT) * size[0].most(size[1].most(size[2]));
             for k in 0..3 {
                 let delta = m + isa.splat(self.pad[k]);
                 let low = (w[k] - delta) * inverse[k];
                 let high = (w[k] + delta) * inverse[k];
                 let is_negative = self.side[k] != 0;
+                self.scale[k].set(v, isa.splat(self.step[k]) * inverse[k]);
                 self.near[k].set(v, if is_negative { high } else { low });
                 self.far[k].set(v, if is_negative { low } else { high });
             }
         }
     }
 
-    /// That of ray `i`, whose inverse direction is given, once they have been made.
+    /// That of ray `i`, once they have been made.
     #[inline(always)]
-    pub fn of(&self, i: usize, inverse: Vec3) -> Sight {
+    pub fn of(&self, i: usize) -> Sight {
         let at = |columns: &[Column; 3]| three!(k => columns[k].0[i % RAYS]);
-        Sight { inverse, near: at(&self.near), far: at(&self.far), side: self.side }
+        Sight { scale: at(&self.scale), near: at(&self.near), far: at(&self.far), side: self.side }
     }
 
     /// Which of `rays` enter each child of `node`, written to `entered` for the children of the mask that comes back,
@@ -86,13 +101,16 @@ impl Sights {
         &mut self,
         isa: I,
         packet: &Packet,
-        (brick, node): (&FlatBrick, &FlatNode),
+        node: &FlatNode,
         rays: u64,
         (entered, least): (&mut [u64; 8], &mut [f32; 8]),
     ) -> u32 {
         let (bounds, side) = (&packet.bounds, self.side);
-        let near = three!(k => isa.load_eight(&node.bounds[side[k]][k]) + isa.eight(self.first[k]));
-        let far = three!(k => isa.load_eight(&node.bounds[1 - side[k]][k]) + isa.eight(self.last[k]));
+        let (begin, end) =
+            (three!(k => isa.steps(&node.bounds[side[k]][k])), three!(k => isa.steps(&node.bounds[1 - side[k]][k])));
+        // Products with powers of two are exact.
+        let near = three!(k => begin[k].times_plus(isa.eight(self.step[k]), isa.eight(self.first[k])));
+        let far = three!(k => end[k].times_plus(isa.eight(self.step[k]), isa.eight(self.last[k])));
         let (slow, fast) = (&bounds.inverse[0], &bounds.inverse[1]);
         let (near_slow, near_fast) =
             (three!(k => near[k] * isa.eight(slow[k])), three!(k => near[k] * isa.eight(fast[k])));
@@ -101,7 +119,7 @@ impl Sights {
         let tf = three!(k => far_slow[k].most(far_fast[k]));
         let tn = tn[0].most(tn[1]).most(tn[2].most(isa.eight(bounds.t_min[0])));
         let tf = tf[0].least(tf[1]).least(tf[2].least(isa.eight(bounds.t[1])));
-        let some = tn.less_equal(tf) & node.present;
+        let some = tn.less_equal(tf) & u32::from(node.present);
         if some == 0 {
             return 0;
         }
@@ -124,22 +142,27 @@ impl Sights {
         if unsure == 0 {
             return met;
         }
-        self.make(isa, packet, brick);
+        self.make(isa, packet);
+        let mut sides = [[[0.0; 8]; 3]; 2];
+        for k in 0..3 {
+            begin[k].store(&mut sides[0][k]);
+            end[k].store(&mut sides[1][k]);
+        }
         for v in 0..packet.vectors::<I>() {
             let shift = v * I::Wide::LANES;
             let lanes = (rays >> shift) & (u64::MAX >> (RAYS - I::Wide::LANES));
             if lanes == 0 {
                 continue;
             }
-            let inverse = three!(k => packet.inverse[k].get(isa, v));
+            let scale = three!(k => self.scale[k].get(isa, v));
             let (near, far) = (three!(k => self.near[k].get(isa, v)), three!(k => self.far[k].get(isa, v)));
             let (t_min, t_max) = (packet.t_min.get(isa, v), packet.t.get(isa, v));
             let mut left = unsure;
             while left != 0 {
                 let i = left.trailing_zeros() as usize % 8;
                 left &= left - 1;
-                let n = three!(k => isa.splat(node.bounds[side[k]][k][i]).times_plus(inverse[k], near[k]));
-                let f = three!(k => isa.splat(node.bounds[1 - side[k]][k][i]).times_plus(inverse[k], far[k]));
+                let n = three!(k => isa.splat(sides[0][k][i]).times_plus(scale[k], near[k]));
+                let f = three!(k => isa.splat(sides[1][k][i]).times_plus(scale[k], far[k]));
                 let (tn, tf) = (n[0].most(n[1]).most(n[2].most(t_min)), f[0].least(f[1]).least(f[2].least(t_max)));
                 let bits = u64::from(tn.less_equal(tf)) & lanes;
                 entered[i] |= bits << shift;

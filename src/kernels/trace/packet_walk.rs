@@ -8,7 +8,7 @@ use super::packet_node::Place;
 use super::scratch::Scratch;
 use super::walk_brick::{Group, STACK_SIZE, Stack, Visits};
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::flat::FlatBrick;
+use crate::kernels::flat::{FlatBrick, FlatNode};
 use crate::kernels::layout::{COUNTER_STACK_OVERFLOW, INSTANCE_IDENTITY, NONE};
 use crate::kernels::simd::isa::{Isa, Lanes};
 
@@ -188,8 +188,8 @@ impl PacketScratch {
                     left &= left - 1;
                     r.ray = self.packet.ray(i);
                     if let Some(flat) = flat {
-                        self.sights.make(isa, &self.packet, flat);
-                        let sight = self.sights.of(i, r.ray.frame.inv);
+                        self.sights.make(isa, &self.packet);
+                        let sight = self.sights.of(i);
                         self.walk_flat(isa, (&r, &sight), flat, tally, (i, index), any_hit);
                         continue;
                     }
@@ -199,7 +199,7 @@ impl PacketScratch {
                 continue;
             }
             let children = match flat {
-                Some(flat) => self.open_flat(isa, &r, flat, (index, rays), any_hit),
+                Some(flat) => self.open_flat(isa, &r, &flat.nodes[index as usize], rays, any_hit),
                 _ => self.open_node(isa, bound, &r, &place, (index, rays), any_hit),
             };
             if !put(&mut self.bricks, &mut depth, children, tally) {
@@ -269,25 +269,17 @@ impl PacketScratch {
 
     /// [`PacketScratch::open_node`] of a brick that is flat.
     #[inline(always)]
-    fn open_flat<I: Isa>(
-        &mut self,
-        isa: I,
-        r: &BrickRay,
-        flat: &FlatBrick,
-        (index, rays): (u32, u64),
-        any_hit: bool,
-    ) -> PacketGroup {
-        let node = &flat.nodes[index as usize];
+    fn open_flat<I: Isa>(&mut self, isa: I, r: &BrickRay, node: &FlatNode, rays: u64, any_hit: bool) -> PacketGroup {
         let (mut entered, mut near) = ([0; 8], [0.0; 8]);
-        let met = self.sights.open(isa, &self.packet, (flat, node), rays, (&mut entered, &mut near));
+        let met = self.sights.open(isa, &self.packet, node, rays, (&mut entered, &mut near));
         let opened = node.opened(met, self.packet.flip);
         if opened.triangles.bits != 0 {
             let mut testing = [0; 32];
-            let mut leaves = met & !node.inner_mask;
+            let mut leaves = met & !u32::from(node.inner_mask);
             while leaves != 0 {
                 let i = leaves.trailing_zeros() as usize % 8;
                 leaves &= leaves - 1;
-                let mut own = node.triangles[i];
+                let mut own = node.triangles_of(i);
                 while own != 0 {
                     testing[own.trailing_zeros() as usize] = entered[i];
                     own &= own - 1;

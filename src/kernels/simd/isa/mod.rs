@@ -43,6 +43,9 @@ pub trait Isa: Copy + Send + Sync {
     /// Eight bounds as numbers.
     fn numbers(self, bytes: &[u8; 8]) -> Self::Eight;
 
+    /// Eight numbers of steps.
+    fn steps(self, words: &[u16; 8]) -> Self::Eight;
+
     /// Origin and steps of a node's grid by axis; the other lanes are 0.
     fn grid(self, node: &Node) -> [Self::Eight; 2];
 
@@ -109,6 +112,11 @@ impl Isa for Scalar {
     }
 
     #[inline(always)]
+    fn steps(self, words: &[u16; 8]) -> Portable {
+        Portable(words.map(f32::from))
+    }
+
+    #[inline(always)]
     fn grid(self, node: &Node) -> [Portable; 2] {
         let [x, y, z] = node.origin;
         let [i, j, k] = node.exponent.map(|e| f32::from_bits(u32::from(e) << 23));
@@ -152,6 +160,7 @@ macro_rules! isa_over_intrinsics {
             isa_over_intrinsics!(fn eight(x: f32) -> $eight { <$eight>::splat(x) });
             isa_over_intrinsics!(fn load_eight(from: &[f32; 8]) -> $eight { <$eight>::load(from) });
             isa_over_intrinsics!(fn numbers(bytes: &[u8; 8]) -> $eight { <$eight>::of(numbers(bytes)) });
+            isa_over_intrinsics!(fn steps(words: &[u16; 8]) -> $eight { <$eight>::of(steps(words)) });
             isa_over_intrinsics!(fn grid(node: &Node) -> [$eight; 2] {
                 let [origin, step] = grid(node);
                 [<$eight>::of(extended(origin)), <$eight>::of(extended(step))]

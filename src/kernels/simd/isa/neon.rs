@@ -63,6 +63,15 @@ fn numbers(bytes: &[u8; 8]) -> float32x4x2_t {
     float32x4x2_t(vcvtq_f32_u32(low), vcvtq_f32_u32(high))
 }
 
+/// Eight words as numbers.
+#[inline]
+#[target_feature(enable = "neon")]
+fn steps(words: &[u16; 8]) -> float32x4x2_t {
+    // SAFETY: all eight words are there.
+    let words = unsafe { vld1q_u16(words.as_ptr()) };
+    float32x4x2_t(vcvtq_f32_u32(vmovl_u16(vget_low_u16(words))), vcvtq_f32_u32(vmovl_high_u16(words)))
+}
+
 /// Origin and steps of a node's grid; the last lanes are 0.
 #[inline]
 #[target_feature(enable = "neon")]

@@ -68,6 +68,15 @@ fn numbers(bytes: &[u8; 8]) -> __m256 {
     _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_cvtsi64_si128(i64::from_le_bytes(*bytes))))
 }
 
+/// Eight words as numbers.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn steps(words: &[u16; 8]) -> __m256 {
+    // SAFETY: all eight words are there.
+    let words = unsafe { _mm_loadu_si128(words.as_ptr().cast()) };
+    _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(words))
+}
+
 /// Origin and steps of a node's grid; the last lanes are 0.
 #[inline]
 #[target_feature(enable = "avx2")]
