@@ -8,18 +8,19 @@ use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{self, Params};
 use crate::kernels::payloads::AttributeView;
 use crate::kernels::query::stand_ins;
+use crate::kernels::query::wanted::intersect_and_query;
 use crate::kernels::rays::RaySet;
 use crate::kernels::shade::more;
 use crate::kernels::shade::shade::Pixels;
 use crate::kernels::simd::isa::Best;
-use crate::kernels::table::{self, Family, Target};
+use crate::kernels::table::{self, Family, Target, names};
 use crate::kernels::texture::texels::{Sampling, Texels, TileDemand};
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::intersect_binary::BinaryTrees;
 use crate::kernels::{
     DeviceInfo, Directions, Extent, FrameExecutor, Keep, Lamps, Setup, Tuning, View, opacity, padded, report, textures,
 };
-use crate::schedule::{BrickStates, Executor, ExecutorError, Load, PairQuery, Pass, Report, Step};
+use crate::schedule::{BrickStates, Executor, ExecutorError, Load, Own, PairQuery, Pass, Report, Step};
 use crate::stream::{PayloadSource, Workers};
 use bricks::SceneFile;
 use std::any::Any;
@@ -300,32 +301,52 @@ impl Executor for CpuExecutor {
         let counters = Counters::default();
         let mut ms_phases = [0.0; 3];
         let everything = bricks.all_geometry_resident();
+        // Of all steps, in order.
+        let mut all = Vec::new();
         for &step in steps.iter().filter(|step| samples || !step.is_sampling()) {
-            if !step.leaves_pending() {
-                self.buffers.sets.iter_mut().for_each(|set| set.waiting.clear());
-            }
             self.pairs_are_culled = are_pairs_culled(step, self.pairs_are_culled, self.tuning.threshold);
             let flags = if self.pairs_are_culled { layout::PARAM_CULLED } else { 0 };
             let params = Params { flags, ..params };
-            for dispatch in dispatches(pass, step, &params, &self.directions, everything) {
-                let start = Instant::now();
-                let bound = Bound {
-                    params: &dispatch.params,
-                    block: &dispatch.own,
-                    scene: &self.scene,
-                    bricks: &geometry,
-                    slots: &slots,
-                    demand: &demand,
-                    counters: &counters,
-                    lamps: &self.lamps,
-                    count: self.count,
-                    isa: self.isa,
-                };
+            let of_step = dispatches(pass, step, &params, &self.directions, everything);
+            all.extend(of_step.into_iter().map(|dispatch| (step, dispatch)));
+        }
+        let all_have = Bound {
+            params: &params,
+            block: &[0; Own::WORDS],
+            scene: &self.scene,
+            bricks: &geometry,
+            slots: &slots,
+            demand: &demand,
+            counters: &counters,
+            lamps: &self.lamps,
+            count: self.count,
+            isa: self.isa,
+        };
+        let mut left = &all[..];
+        while let [(step, dispatch), rest @ ..] = left {
+            left = rest;
+            if !step.leaves_pending() {
+                self.buffers.sets.iter_mut().for_each(|set| set.waiting.clear());
+            }
+            let bound = Bound { params: &dispatch.params, block: &dispatch.own, ..all_have };
+            let start = Instant::now();
+            let mut asking = 0.0;
+            if let [(_, query), rest @ ..] = rest
+                && (dispatch.kernel, query.kernel) == (names::intersect_selected, names::query_all)
+            {
+                left = rest;
+                let Buffers { sets, tiles, .. } = &mut self.buffers;
+                let of_query = Bound { params: &query.params, ..bound };
+                asking = intersect_and_query(&bound, &of_query, &mut sets[pass.set()], &tiles.pair_counts);
+            } else {
+                let sampling = (sampling, &tile_demand[..]);
                 let binary = self.binary.as_ref();
-                run_kernel(&dispatch, pass, &bound, &mut self.buffers, &attributes, (sampling, &tile_demand), binary)?;
-                if let Some(phase) = dispatch.phase {
-                    ms_phases[phase] += start.elapsed().as_secs_f64() * 1e3;
-                }
+                run_kernel(dispatch, pass, &bound, &mut self.buffers, &attributes, sampling, binary)?;
+            }
+            let ms = start.elapsed().as_secs_f64() * 1e3;
+            if let Some(phase) = dispatch.phase {
+                ms_phases[phase] += ms * (1.0 - asking);
+                ms_phases[1] += ms * asking;
             }
         }
         let demand: Vec<layout::Demand> = demand.iter().map(Demand::get).collect();

@@ -11,7 +11,7 @@ use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::Wide;
 use crate::kernels::tiles::PairCounts;
-use crate::kernels::trace::intersect_all::leading;
+use crate::kernels::trace::intersect_all::{IntersectAll, leading};
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::{is_pending, set_pending};
 use crate::kernels::trace::node::{entered_children, inner_before};
@@ -20,6 +20,8 @@ use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::{Entries, PacketScratch, Waiting};
 use crate::kernels::trace::run::{PacketKernel, Work, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 
 /// Of the rays of `work`, all or those that walk from the root.
 pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts) {
@@ -27,11 +29,65 @@ pub fn query_all(bound: &Bound, set: &mut RaySet, work: Work, pairs: &PairCounts
     run_for_each_packet(set, bound, work, &Wanted { bound, pairs, leading: &leading });
 }
 
-/// Queries of rays that are pending. Their distances are their limits.
+/// [`intersect_all`] with what `intersect` selects, and then [`query_all`], of all rays: the same, but that rays come
+/// together once for both. Returns what share of the time was taken by queries.
+///
+/// [`intersect_all`]: crate::kernels::trace::intersect_all::intersect_all
+pub fn intersect_and_query(intersect: &Bound, bound: &Bound, set: &mut RaySet, pairs: &PairCounts) -> f64 {
+    let leading = leading(bound, set.rays.len());
+    let of_selected = if intersect.count { Vec::new() } else { self::leading(intersect, set.rays.len()) };
+    let both = Both {
+        intersect: IntersectAll { bound: intersect, pairs, leading: &of_selected },
+        wanted: Wanted { bound, pairs, leading: &leading },
+        nanoseconds: Default::default(),
+    };
+    run_for_each_packet(set, intersect, Work::All, &both);
+    let [tracing, asking] = both.nanoseconds.map(|ns| ns.into_inner() as f64);
+    asking / (tracing + asking).max(1.0)
+}
+
+/// Queries of rays that are pending.
 struct Wanted<'a> {
     bound: &'a Bound<'a>,
     pairs: &'a PairCounts,
     leading: &'a [u8],
+}
+
+/// What rays meet, and then their queries.
+struct Both<'a> {
+    intersect: IntersectAll<'a, true>,
+    wanted: Wanted<'a>,
+    /// What each took, over all tasks.
+    nanoseconds: [AtomicU64; 2],
+}
+
+impl PacketKernel for Both<'_> {
+    const NARROWS: bool = true;
+
+    #[inline(always)]
+    fn takes(&self, slot: &mut Slot) -> bool {
+        self.wanted.takes(slot)
+    }
+
+    #[inline(always)]
+    fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
+        let start = Instant::now();
+        self.intersect.run_packet(isa, scratch, packets, tile);
+        let met = Instant::now();
+        let (found, rays) = (packets.packet.t, packets.packet.all() & !packets.packet.done);
+        packets.packet.shorten(isa);
+        self.wanted.ask(isa, scratch, packets, (tile, rays));
+        packets.packet.t = found;
+        for (all, took) in self.nanoseconds.iter().zip([met - start, met.elapsed()]) {
+            all.fetch_add(took.as_nanos() as u64, Ordering::Relaxed);
+        }
+    }
+
+    #[inline(always)]
+    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+        self.intersect.write(isa, packet, hits, surfaces, places);
+        self.wanted.write(isa, packet, hits, surfaces, places);
+    }
 }
 
 /// The brick that each ray enters before any other that it asks for, and where.
@@ -58,13 +114,31 @@ impl PacketKernel for Wanted<'_> {
 
     #[inline(always)]
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize) {
+        let rays = packets.packet.all();
+        self.ask(isa, scratch, packets, (tile, rays));
+    }
+
+    #[inline(always)]
+    fn write<I: Isa>(&self, _: I, packet: &Packet, _: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+        for (i, &at) in places.iter().enumerate() {
+            if packet.asking >> i & 1 != 0 {
+                set_pending(&mut surfaces[at as usize], true);
+            }
+        }
+    }
+}
+
+impl Wanted<'_> {
+    /// Has `rays` of a packet ask. Their distances are their limits, and come nearer.
+    #[inline(always)]
+    fn ask<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, (tile, rays): (usize, u64)) {
         let bound = self.bound;
         let PacketScratch { packet, entries, .. } = packets;
         let mut r = BrickRay::outside(&packet.ray(0));
         let place = Place::new([0.0; 3], [0.0; 3], bound.params.instance_pad);
         let mut first = First::nothing();
         entries.waiting.clear();
-        entries.waiting.push(Waiting { node: 0, rays: packet.all(), near: Column::ZERO });
+        entries.waiting.push(Waiting { node: 0, rays, near: Column::ZERO });
         'walk: while let Some(Waiting { node: at, rays, near }) = entries.waiting.pop() {
             let rays = first.reaching(isa, packet, &near, rays);
             if rays == 0 {
@@ -107,16 +181,7 @@ impl PacketKernel for Wanted<'_> {
                 }
             }
         }
-        packet.done = first.tell(bound, scratch);
-    }
-
-    #[inline(always)]
-    fn write<I: Isa>(&self, _: I, packet: &Packet, _: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
-        for (i, &at) in places.iter().enumerate() {
-            if packet.done >> i & 1 != 0 {
-                set_pending(&mut surfaces[at as usize], true);
-            }
-        }
+        packet.asking = first.tell(bound, scratch);
     }
 }
 

@@ -50,10 +50,14 @@ pub fn leading(bound: &Bound, rays: usize) -> Vec<u8> {
     leading
 }
 
-struct IntersectAll<'a, const SELECT: bool> {
-    bound: &'a Bound<'a>,
-    pairs: &'a PairCounts,
-    leading: &'a [u8],
+/// Intersects packets.
+pub struct IntersectAll<'a, const SELECT: bool> {
+    /// With what.
+    pub bound: &'a Bound<'a>,
+    /// Which pairs are culled.
+    pub pairs: &'a PairCounts,
+    /// [`leading`] to what is selected.
+    pub leading: &'a [u8],
 }
 
 impl<const SELECT: bool> IntersectAll<'_, SELECT> {

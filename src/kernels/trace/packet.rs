@@ -128,6 +128,8 @@ pub struct Packet {
     pub flip: u32,
     /// Rays that have ended, a bit each.
     pub done: u64,
+    /// Rays that ask for a brick.
+    pub asking: u64,
     /// The axis of the largest component of all directions; 3: they differ.
     pub axis: u32,
     /// Rays whose directions are largest along x, and along y, a bit each.
@@ -182,6 +184,7 @@ impl Packet {
             count: 0,
             flip: 0,
             done: 0,
+            asking: 0,
             axis: 3,
             largest: [0; 2],
             origin: [zero; 3],
