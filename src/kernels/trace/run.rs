@@ -359,8 +359,12 @@ impl Groups {
             if K::NARROWS {
                 let word = &band.waiting[block.number_of(width, self.square)];
                 let bits = word.load(Ordering::Relaxed);
+                let is_full = bits == u64::MAX;
                 let mut left = 0;
                 block.for_each_bit(width, self.square, bits, |at| {
+                    if is_full {
+                        band.prefetch(isa, at + BLOCK);
+                    }
                     let mut slot = band.slot(block.tile, at);
                     if is_pending(slot.surface) {
                         left |= Block::bit_of(width, at);
