@@ -1,6 +1,6 @@
 //! One ray against the children of a node of a brick that is flat ([`crate::kernels::flat`]).
 
-use super::node::{FramedRay, UNIT};
+use super::node::{FramedRay, UNIT, inner_before};
 use super::walk_brick::{Group, OpenedNode, STACK_SIZE};
 use crate::kernels::flat::{FlatBrick, FlatNode, Grid};
 use crate::kernels::simd::isa::Isa;
@@ -45,14 +45,7 @@ impl Sight {
     /// Opens a node between `t_min` and `t_max`: what the ray enters of its children goes to `open`, what of its
     /// triangles it may meet comes back.
     #[inline(always)]
-    pub fn open<I: Isa>(
-        &self,
-        isa: I,
-        node: &FlatNode,
-        flip: u32,
-        (t_min, t_max): (f32, f32),
-        open: &mut FlatOpen,
-    ) -> Group {
+    pub fn open<I: Isa>(&self, isa: I, node: &FlatNode, (t_min, t_max): (f32, f32), open: &mut FlatOpen) -> Group {
         let scale = three!(k => isa.eight(self.scale[k]));
         let near = three!(k => {
             isa.steps(&node.bounds[self.side[k]][k]).times_plus(scale[k], isa.eight(self.near[k]))
@@ -63,8 +56,8 @@ impl Sight {
         let near = near[0].most(near[1]).most(near[2].most(isa.eight(t_min)));
         let far = far[0].least(far[1]).least(far[2].least(isa.eight(t_max)));
         // Not pruned at equality: a hit at equal distance with a lower id must be found.
-        let OpenedNode { children, triangles } = node.opened(near.less_equal(far), flip);
-        open.group = children;
+        let (children, triangles) = node.met(near.less_equal(far));
+        (open.left, open.inner_mask, open.base) = (children, node.inner_mask.into(), node.child_base);
         near.store(&mut open.near);
         triangles
     }
@@ -79,23 +72,33 @@ pub type FlatStack = [FlatOpen; STACK_SIZE];
 pub struct FlatOpen {
     /// No more than the distance at which the ray enters each.
     pub near: [f32; 8],
-    /// Those.
-    pub group: Group,
+    /// Those, a bit each.
+    left: u32,
+    /// As of the node.
+    inner_mask: u32,
+    /// The first of its children.
+    base: u32,
 }
 
 impl FlatOpen {
-    /// Takes the next child of the topmost of `depth` nodes: the nearest that is entered up to `t_max`.
+    /// Takes the next child of the topmost of `depth` nodes: the nearest, if it is entered up to `t_max`.
     #[inline(always)]
-    pub fn take(stack: &mut FlatStack, depth: &mut usize, flip: u32, t_max: f32) -> Option<u32> {
+    pub fn take(stack: &mut FlatStack, depth: &mut usize, t_max: f32) -> Option<u32> {
         while *depth > 0 {
             let top = &mut stack[*depth - 1];
-            while top.group.has_children() {
-                let group = top.group;
-                let (slot, rest) = group.nearest_child(flip);
-                top.group = rest;
-                if top.near[(slot & 7) as usize] <= t_max {
-                    *depth -= usize::from(!rest.has_children());
-                    return Some(group.child_index(slot));
+            if top.left != 0 {
+                let mut slot = top.left.trailing_zeros() as usize % 8;
+                let mut others = top.left & (top.left - 1);
+                while others != 0 {
+                    let other = others.trailing_zeros() as usize % 8;
+                    others &= others - 1;
+                    slot = if top.near[other] < top.near[slot] { other } else { slot };
+                }
+                // Where the nearest is too far, all are.
+                if top.near[slot] <= t_max {
+                    top.left &= !(1 << slot);
+                    *depth -= usize::from(top.left == 0);
+                    return Some(top.base + inner_before(top.inner_mask, slot as u32));
                 }
             }
             *depth -= 1;
@@ -113,9 +116,9 @@ fn by_priority(bits: u32, flip: u32) -> u32 {
 }
 
 impl FlatNode {
-    /// What is met of it where children are entered, a bit each.
+    /// What is met of it where children are entered, a bit each: inner children, a bit each, and triangles.
     #[inline(always)]
-    pub fn opened(&self, entered: u32, flip: u32) -> OpenedNode {
+    fn met(&self, entered: u32) -> (u32, Group) {
         let (inner_mask, present) = (u32::from(self.inner_mask), u32::from(self.present));
         let inner = entered & inner_mask;
         let mut leaves = entered & present & !inner_mask;
@@ -124,10 +127,15 @@ impl FlatNode {
             triangles |= self.triangles_of(leaves.trailing_zeros() as usize);
             leaves &= leaves - 1;
         }
-        OpenedNode {
-            children: Group { base: self.child_base, bits: by_priority(inner, flip) << 24 | inner_mask },
-            triangles: Group { base: self.triangle_base, bits: triangles },
-        }
+        (inner, Group { base: self.triangle_base, bits: triangles })
+    }
+
+    /// The same with the inner children by priority.
+    #[inline(always)]
+    pub fn opened(&self, entered: u32, flip: u32) -> OpenedNode {
+        let (inner, triangles) = self.met(entered);
+        let bits = by_priority(inner, flip) << 24 | u32::from(self.inner_mask);
+        OpenedNode { children: Group { base: self.child_base, bits }, triangles }
     }
 }
 

@@ -343,7 +343,7 @@ impl PacketScratch {
         (i, index): (usize, u32),
         any_hit: bool,
     ) {
-        let (mut best, flip) = (self.packet.best(i), r.ray.flip);
+        let mut best = self.packet.best(i);
         best.leaf = NONE;
         let (mut next, mut depth) = (Some(index), 0);
         while let Some(index) = next {
@@ -351,8 +351,7 @@ impl PacketScratch {
                 tally.add(COUNTER_STACK_OVERFLOW, 1);
                 break;
             }
-            let triangles =
-                sight.open(isa, &flat.nodes[index as usize], flip, (r.ray.t_min, best.t), &mut self.open[depth]);
+            let triangles = sight.open(isa, &flat.nodes[index as usize], (r.ray.t_min, best.t), &mut self.open[depth]);
             if triangles.bits != 0 {
                 r.test_flat(isa, flat, &mut best, triangles, any_hit);
                 if any_hit && best.leaf != NONE {
@@ -361,7 +360,7 @@ impl PacketScratch {
                 }
             }
             depth += 1;
-            next = FlatOpen::take(&mut self.open, &mut depth, flip, best.t);
+            next = FlatOpen::take(&mut self.open, &mut depth, best.t);
         }
         if best.leaf != NONE {
             self.packet.set_best(i, &best);
