@@ -65,16 +65,23 @@ pub struct Drawn {
 
 impl Gloss {
     /// Of a hit seen along -view, of any length.
+    #[inline]
     pub fn of<'a>(hit: impl Into<Shown<'a>>, m: &Material, view: Vec3) -> Self {
         let shown = hit.into();
-        let (g, x): (&GBuffer, More) = (&shown, shown.more(m));
-        let mut albedo = g.albedo;
-        let mut s = Self { diffuse: g.albedo, ..Self::default() };
+        let g: &GBuffer = &shown;
         let has_layers = m.flags & MATERIAL_LAYERS != 0;
         let is_matt = !(g.metallic > 0.0 || m.specular_weight > 0.0 || m.clearcoat > 0.0 || has_layers);
         if m.flags & MATERIAL_UNLIT != 0 || is_matt {
-            return s;
+            return Self { diffuse: g.albedo, ..Self::default() };
         }
+        Self::of_facets(&shown, m, view)
+    }
+
+    /// The same of one that is not matt.
+    fn of_facets(shown: &Shown, m: &Material, view: Vec3) -> Self {
+        let (g, x): (&GBuffer, More) = (shown, shown.more(m));
+        let mut albedo = g.albedo;
+        let mut s = Self { diffuse: g.albedo, ..Self::default() };
         s.normal = g.normal;
         s.view = normalize(view);
         s.cos_view = most(dot(s.normal, s.view), LEAST_COS_VIEW);

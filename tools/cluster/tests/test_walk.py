@@ -88,11 +88,13 @@ def test_workers_that_are_killed_lose_nothing(city, whole, tmp_path):
         # The walk is made until ten have been killed, each time from nothing.
         rounds = 0
         while rounds == 0 or (len(killed) < 10 and rounds < 40):
-            output = tmp_path / f"out-{rounds}"
+            output, before = tmp_path / f"out-{rounds}", len(killed)
             walk(cluster, words(city, output), chunk=3, is_quiet=True, log=f"{log}-{rounds}")
             assert frames(output) == whole
             times = Counter((tmp_path / f"log-{rounds}").read_text().split())
-            assert len(times) == 60 and max(times.values()) <= 2, times.most_common(3)
+            # A worker that is killed may not have told of its last part, which nobody renders again.
+            untold = 60 - len(times)
+            assert 0 <= untold <= len(killed) - before and max(times.values()) <= 2, times.most_common(3)
             rounds += 1
         stop.set()
         thread.join(20)
@@ -156,7 +158,8 @@ def test_a_connection_that_breaks_is_told_from_a_task_that_fails(monkeypatch):
 
 
 def test_bands_of_one_picture_are_rendered_by_several_workers(city, run, tmp_path):
-    view = ["--size", "128x256", "--bands", "4", "--frames", "2", "--adapter", "cpu", "--aov"]
+    # Of so many samples that one worker cannot have rendered all before the other begins.
+    view = ["--size", "128x256", "--bands", "4", "--frames", "2", "--adapter", "cpu", "--aov", "--spp", "64"]
     run("walk", city, "-o", tmp_path / "whole", *view)
     log = tmp_path / "log"
     with Cluster(workers=2) as cluster:
