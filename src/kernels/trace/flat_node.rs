@@ -81,18 +81,21 @@ pub struct FlatOpen {
 }
 
 impl FlatOpen {
-    /// Takes the next child of the topmost of `depth` nodes: the nearest, if it is entered up to `t_max`.
+    /// Takes the next child of the topmost of `depth` nodes: the nearest, if it is entered up to `t_max`. A ray that
+    /// asks for any hit is given its octant, and visits children in the order of packed nodes: which hit comes first
+    /// depends on it. Its `t_max` stays as it was when nodes were opened.
     #[inline(always)]
-    pub fn take(stack: &mut FlatStack, depth: &mut usize, t_max: f32) -> Option<u32> {
+    pub fn take(stack: &mut FlatStack, depth: &mut usize, octant: Option<u32>, t_max: f32) -> Option<u32> {
         while *depth > 0 {
             let top = &mut stack[*depth - 1];
+            let order = |slot: usize| octant.map_or(top.near[slot], |octant| (slot as u32 ^ octant) as f32);
             if top.left != 0 {
                 let mut slot = top.left.trailing_zeros() as usize % 8;
                 let mut others = top.left & (top.left - 1);
                 while others != 0 {
                     let other = others.trailing_zeros() as usize % 8;
                     others &= others - 1;
-                    slot = if top.near[other] < top.near[slot] { other } else { slot };
+                    slot = if order(other) < order(slot) { other } else { slot };
                 }
                 // Where the nearest is too far, all are.
                 if top.near[slot] <= t_max {

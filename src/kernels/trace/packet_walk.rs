@@ -345,6 +345,7 @@ impl PacketScratch {
     ) {
         let mut best = self.packet.best(i);
         best.leaf = NONE;
+        let octant = any_hit.then_some(r.ray.flip);
         let (mut next, mut depth) = (Some(index), 0);
         while let Some(index) = next {
             if depth == STACK_SIZE {
@@ -360,7 +361,7 @@ impl PacketScratch {
                 }
             }
             depth += 1;
-            next = FlatOpen::take(&mut self.open, &mut depth, best.t);
+            next = FlatOpen::take(&mut self.open, &mut depth, octant, best.t);
         }
         if best.leaf != NONE {
             self.packet.set_best(i, &best);
