@@ -1,8 +1,9 @@
 //! Bricks in the form that the processor walks fastest: all boxes on one grid, the vertices of triangles side by side.
 //!
 //! Packed nodes have grids of their own, which are seen from a ray one by one. Here what a ray makes of the grid is the
-//! same in all of a brick, and no index is looked up. Boxes are those of the packed nodes, up to a step of the grid, and
-//! nodes and triangles have the same numbers. Triangles are tested by the same operations, so hits are the same, bit for bit.
+//! same in all of a brick, and no index is looked up. Boxes are those of the packed nodes, up to a step of the grid.
+//! Nodes and triangles have the same numbers. Triangles are tested by the same operations, so hits are the same, bit
+//! for bit.
 
 use super::vector::Vec3;
 use bricks::{BRICK_WIDE, Brick, Node};

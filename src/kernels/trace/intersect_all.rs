@@ -25,9 +25,9 @@ pub fn intersect_all<const SELECT: bool>(bound: &Bound, set: &mut RaySet, work: 
 /// With fewer rays for each node of the top level, looking through all nodes costs more than it saves.
 const RAYS_A_NODE: usize = 4;
 
-/// Of each node of the top level the children that lead to a selected brick, a bit each. A ray meets
-/// and asks for nothing below others, so it need not walk there. Empty where there are too few rays for that to pay:
-/// then all may lead there.
+/// Of each node of the top level the children that lead to a selected brick, a bit each. A ray meets and asks for
+/// nothing below others, so it need not walk there. Empty where there are too few rays for that to pay: then all may
+/// lead there.
 pub fn leading(bound: &Bound, rays: usize) -> Vec<u8> {
     let nodes = &bound.scene.top8;
     if nodes.len() > rays / RAYS_A_NODE {
