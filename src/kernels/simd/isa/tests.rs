@@ -85,7 +85,7 @@ fn compare_with_scalar(isa: impl Isa) {
         for k in 0..3 {
             assert_eq!(bits(isa.numbers(&node.lo[k])), bits(Scalar.numbers(&node.lo[k])), "case {case}: {node:?}");
         }
-        let words = node.lo[0].map(|byte| u16::from(byte) * 257 ^ case as u16);
+        let words = node.lo[0].map(|byte| (u16::from(byte) * 257) ^ case as u16);
         assert_eq!(bits(isa.steps(&words)), words.map(|word| f32::from(word).to_bits()), "{words:?}");
         assert_eq!(isa.grid(&node).map(bits), Scalar.grid(&node).map(bits), "case {case}: {node:?}");
     }
