@@ -276,7 +276,7 @@ impl Cache {
         stats: &mut Counters,
     ) -> Result<usize, ExecutorError> {
         let start = Instant::now();
-        let before = self.residency.counters();
+        let (before, head) = (self.residency.counters(), self.residency.head());
         let (mut taken, mut loads, mut bytes) = (0, Vec::new(), 0);
         for &item in items.iter().take(most) {
             let is_resident = self.residency.slot(item).is_some();
@@ -303,6 +303,7 @@ impl Cache {
                 self.residency.withdraw(load.item);
                 self.states.forget(load.item);
             }
+            self.residency.rewind(head);
             return Err(error);
         }
         for load in &loads {

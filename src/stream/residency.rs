@@ -432,6 +432,23 @@ impl Residency {
         true
     }
 
+    /// Where round robin writes next, for [`Self::rewind`]; 0 for LRU.
+    pub fn head(&self) -> u64 {
+        match &self.placement {
+            Placement::RoundRobin(ring) => ring.head(),
+            Placement::Lru(_) => 0,
+        }
+    }
+
+    /// Has round robin write next where it would have when [`Self::head`] gave `head`. After a batch has been withdrawn
+    /// its room is written first then. A cache that holds everything evicts nothing only as long as it writes without
+    /// gaps.
+    pub fn rewind(&mut self, head: u64) {
+        if let Placement::RoundRobin(ring) = &mut self.placement {
+            ring.rewind(head);
+        }
+    }
+
     /// Frees the room of a resident item and whatever was noted of it, but for the counters. `is_overwritten`: for
     /// another.
     fn release(&mut self, item: Item, is_overwritten: bool) {

@@ -149,6 +149,11 @@ impl Ring {
     pub fn head(&self) -> u64 {
         self.head
     }
+
+    /// Has the next write begin at `head`, as [`Self::head`] gave it.
+    pub fn rewind(&mut self, head: u64) {
+        self.head = head;
+    }
 }
 
 impl Chances {

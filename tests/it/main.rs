@@ -45,6 +45,7 @@ mod exact {
     mod paths;
     mod rays;
     mod records;
+    mod refused;
     mod threshold;
     mod twins;
 }

@@ -42,6 +42,8 @@ pub enum Broken {
     KeepsMarks,
     /// Moves the head whatever it brings back.
     NeverStays,
+    /// Writes on where it is.
+    NeverRewinds,
 }
 
 /// Bytes of an item.
@@ -97,6 +99,17 @@ impl Model {
         self.recency.retain(|&other| other != item);
         self.pinned.retain(|&other| other != item);
         self.marked.retain(|&other| other != item);
+    }
+
+    /// Where the next write begins, in cells.
+    pub fn head(&self) -> usize {
+        self.head
+    }
+
+    pub fn rewind(&mut self, head: usize) {
+        if self.broken != Broken::NeverRewinds {
+            self.head = head;
+        }
     }
 
     /// Whether `count` cells from `start` are in one page and all `usable`.

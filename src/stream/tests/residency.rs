@@ -29,6 +29,7 @@ fn run_schedule(seed: u64, policy: Policy, broken: Broken, steps: usize) -> Resu
     let mut cache = Residency::new(&sizes, budget, page, policy).map_err(|error| error.to_string())?;
     let mut model = Model::new(&sizes, budget, page, policy, broken);
     let address = |slot: Slot| slot.page as u64 * page + slot.offset as u64;
+    let mut head = (0, 0);
     for step in 0..steps {
         let at = |what: &str| format!("seed {seed}, {policy}, step {step}: {what}");
         let items = sizes.rows() as u64;
@@ -56,6 +57,12 @@ fn run_schedule(seed: u64, policy: Policy, broken: Broken, steps: usize) -> Resu
             8 if !empty => {
                 cache.withdraw(item);
                 model.withdraw(item);
+            }
+            9 => {
+                let now = (cache.head(), model.head());
+                let before = std::mem::replace(&mut head, now);
+                cache.rewind(before.0);
+                model.rewind(before.1);
             }
             _ if empty => {
                 let placed = cache.insert(item).map_err(|error| at(&error.to_string()))?;
@@ -115,6 +122,7 @@ fn a_broken_model_is_noticed() {
         (Policy::RoundRobin, Broken::IgnoresPins),
         (Policy::RoundRobin, Broken::IgnoresPages),
         (Policy::RoundRobin, Broken::HeadStays),
+        (Policy::RoundRobin, Broken::NeverRewinds),
         (Policy::Lru, Broken::IgnoresPins),
         (Policy::Lru, Broken::IgnoresPages),
         (Policy::Lru, Broken::ForgetsUses),
@@ -406,6 +414,46 @@ fn counters_tell_loaded_reloaded_and_evicted_apart() {
     cache.insert(Item::geometry(0)).unwrap();
     assert_eq!(cache.counters().since(&before).kind(Kind::Geometry).reloaded, 0);
     cache.validate().unwrap();
+}
+
+#[test]
+fn what_holds_all_still_does_after_a_batch_that_did_not_arrive() {
+    let mut lost = 0;
+    for seed in 0..100 {
+        let mut random = Rng(seed);
+        let (sizes, _, page) = random_cache(&mut random);
+        let budget = Residency::budget_for_all(&sizes, page);
+        let items: Vec<Item> = sizes.items().map(|(item, _)| item).collect();
+        let first = random.below(items.len() as u64) as usize;
+        let end = first + 1 + random.below((items.len() - first) as u64) as usize;
+        // All but a batch, which does not arrive; then all.
+        let evicted = |policy: Policy, rewinds: bool| {
+            let mut cache = Residency::new(&sizes, budget, page, policy).unwrap();
+            for &item in &items[..first] {
+                cache.insert(item).unwrap();
+            }
+            let head = cache.head();
+            for &item in &items[first..end] {
+                cache.insert(item).unwrap();
+            }
+            for &item in &items[first..end] {
+                cache.withdraw(item);
+            }
+            if rewinds {
+                cache.rewind(head);
+            }
+            for &item in items[end..].iter().chain(&items) {
+                cache.insert(item).unwrap();
+            }
+            cache.validate().unwrap();
+            cache.counters().total().evicted
+        };
+        for &policy in Policy::ALL {
+            assert_eq!(evicted(policy, true), 0, "seed {seed}, {policy}");
+        }
+        lost += u64::from(evicted(Policy::RoundRobin, false) > 0);
+    }
+    assert!(lost > 10, "without a rewind something must be lost now and then");
 }
 
 #[test]
