@@ -134,7 +134,7 @@ fn reflected_rays_are_as_wide_as_their_lobes_and_the_curvature_say() {
     let tree = Tree::of(file.resident());
     for schedule in ["chc", "demand"] {
         let mut otherwise = 0;
-        for tolerance in [0.25, 0.5] {
+        for tolerance in [0.25, 0.5, 1.0] {
             let options = format!("--lod {tolerance} --schedule {schedule} --effects glossy");
             let seen = Seen::of(&scene, &file, &options);
             // What normals that differ over the width of a pixel's cone at the hit add.

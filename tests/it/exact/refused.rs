@@ -63,7 +63,7 @@ fn frames_are_right_after_a_read_that_was_refused() {
         let opened = sound.reads.load(Ordering::Relaxed);
         let truth = frame(&mut renderer).expect("a frame");
         let reads = sound.reads.load(Ordering::Relaxed);
-        assert!(reads > opened + 6, "{schedule}: {reads} reads, {opened} of them to open it");
+        assert!(reads > opened + 4, "{schedule}: {reads} reads, {opened} of them to open it");
         for refused in opened..reads {
             let mut renderer = open(source(refused), &options).expect("a session");
             let first = frame(&mut renderer).expect_err("a frame without the read");

@@ -2,7 +2,8 @@
 //! exactly one part.
 //!
 //! A few triangles that are much larger than the others of their part would make its box, and with it the number of
-//! rays that need it, as large as themselves. They are taken out of all parts and make up parts of their own.
+//! rays that need it, as large as themselves. They are taken out of all parts and make up parts of their own. Rays meet
+//! these as well, so the part has to get cheaper by half.
 //!
 //! Where the cut goes depends on the triangles alone, not on how many a brick may hold, so parts for different limits
 //! are levels of one tree. That tree cut at [`CANONICAL_TRIANGLES`] gives the extents from which the lattice follows.
@@ -27,7 +28,7 @@ const TASK_ITEMS: usize = 1 << 12;
 const LEAST_SIDE: usize = 16;
 
 /// How many times cheaper a part must get for its large items to be taken out.
-const LARGE_GAIN: f64 = 1.5;
+const LARGE_GAIN: f64 = 2.0;
 
 /// How many times smaller parts of large items are.
 const LARGE_PARTS: usize = 64;

@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3A};
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
@@ -66,6 +67,9 @@ pub(crate) struct BinaryNode {
 /// meshes.
 const CROWDED: f64 = 4096.0;
 
+/// Nodes of a tree that are all inserted anew.
+const REINSERTED: f32 = 16384.0;
+
 /// Boxes below which the square of their number does not matter.
 const LEAST_CHAIN: usize = 512;
 
@@ -83,7 +87,6 @@ impl BinaryTree {
     /// A tree of good quality, of any depth, over at least one box whose coordinates are small against the range of
     /// f32: PLOC with reinsertion, on one thread; `is_fast` searches fewer neighbours and does not reinsert.
     pub fn by_obvhs(boxes: &[Box3], is_fast: bool) -> Self {
-        let vector = |p: [i64; 3]| Vec3A::from_array(p.map(|x| x as f32));
         let aabbs: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(vector(b.min), vector(b.max))).collect();
         if is_chain(&aabbs) {
             return Self::by_splits(boxes, CHAIN_DEPTH);
@@ -96,13 +99,30 @@ impl BinaryTree {
             config.sort_precision,
             config.search_depth_threshold,
         );
-        // Where many nodes are as large as the root the search for a better place visits them all and finds none.
-        let areas = bvh.nodes.iter().map(|node| f64::from(node.aabb().half_area())).sum::<f64>();
-        let root = f64::from(bvh.nodes[0].aabb().half_area());
-        if !is_fast && areas <= root * CROWDED {
-            ReinsertionOptimizer::default().run(&mut bvh, config.reinsertion_batch_ratio, None);
+        if !is_fast {
+            reinsert(&mut bvh, config.reinsertion_batch_ratio);
         }
+        Self::of_obvhs(&bvh, boxes)
+    }
 
+    /// The same over the same boxes, coordinates as of [`Self::by_obvhs`], with nodes inserted anew where they are
+    /// cheaper. It may be deeper.
+    pub fn reinserted(&self, boxes: &[Box3]) -> Self {
+        let nodes = self.nodes.iter().map(|node| {
+            let count = u32::from(node.right == LEAF);
+            Bvh2Node::new(Aabb::new(vector(node.bounds.min), vector(node.bounds.max)), count, node.left)
+        });
+        let mut bvh =
+            Bvh2 { nodes: nodes.collect(), primitive_indices: (0..boxes.len() as u32).collect(), ..Bvh2::default() };
+        // The nodes of small trees all, of large ones so many as of a brick's.
+        let ratio =
+            (REINSERTED / self.nodes.len() as f32).clamp(BvhBuildParams::medium_build().reinsertion_batch_ratio, 1.0);
+        reinsert(&mut bvh, ratio);
+        Self::of_obvhs(&bvh, boxes)
+    }
+
+    /// The tree `bvh` over these boxes, with one a leaf.
+    fn of_obvhs(bvh: &Bvh2, boxes: &[Box3]) -> Self {
         let mut tree = Self::with_capacity(boxes.len());
         tree.nodes.push(PLACEHOLDER);
         let mut stack = vec![(0u32, 0u32)];
@@ -166,6 +186,22 @@ impl BinaryTree {
                 self.nodes[index].bounds = self.nodes[left as usize].bounds.union(&self.nodes[right as usize].bounds);
             }
         }
+    }
+}
+
+/// A point in f32, rounded.
+fn vector(point: [i64; 3]) -> Vec3A {
+    Vec3A::from_array(point.map(|x| x as f32))
+}
+
+/// Inserts this share of the nodes anew where they are cheaper, again and again fewer (Meister, Bittner 2018, "Parallel
+/// reinsertion for bounding volume hierarchy optimization").
+fn reinsert(bvh: &mut Bvh2, share: f32) {
+    // Where many nodes are as large as the root the search for a better place visits them all and finds none.
+    let areas = bvh.nodes.iter().map(|node| f64::from(node.aabb().half_area())).sum::<f64>();
+    let root = f64::from(bvh.nodes[0].aabb().half_area());
+    if areas <= root * CROWDED {
+        ReinsertionOptimizer::default().run(bvh, share, None);
     }
 }
 
@@ -247,6 +283,7 @@ mod tests {
                 BinaryTree::by_obvhs(&boxes, false),
                 BinaryTree::by_splits(&boxes, 64),
                 BinaryTree::by_splits(&boxes, 0),
+                BinaryTree::by_splits(&boxes, 64).reinserted(&boxes),
             ];
             check(&BinaryTree::by_obvhs(&boxes, true), &boxes);
             for tree in &trees {
@@ -254,6 +291,7 @@ mod tests {
             }
             if count == 5000 {
                 assert!(cost(&trees[0]) <= cost(&trees[2]) && cost(&trees[1]) <= cost(&trees[2]));
+                assert!(cost(&trees[3]) < 0.97 * cost(&trees[1]), "{} {}", cost(&trees[3]), cost(&trees[1]));
                 assert_eq!(check(&trees[2], &boxes), 14, "halving gives the least depth");
             }
         }
@@ -274,7 +312,6 @@ mod tests {
     }
 
     fn is_chain_of(boxes: &[Box3]) -> bool {
-        let vector = |p: [i64; 3]| Vec3A::from_array(p.map(|x| x as f32));
         let aabbs: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(vector(b.min), vector(b.max))).collect();
         is_chain(&aabbs)
     }
@@ -294,6 +331,7 @@ mod tests {
         }
         let shuffled: Vec<Box3> = (0..16381).map(|i| concentric(1 + i * 7919 % 16381)).collect();
         check(&BinaryTree::by_obvhs(&shuffled, false), &shuffled);
+        check(&BinaryTree::by_splits(&shuffled, 64).reinserted(&shuffled), &shuffled);
         assert!(!is_chain_of(&boxes(16384)));
     }
 }

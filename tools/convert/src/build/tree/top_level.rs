@@ -38,14 +38,13 @@ pub(crate) fn build(leaves: &[Leaf], boxes: &[Box3]) -> Result<TopLevel, BuildEr
     if leaves.is_empty() {
         return Ok(TopLevel::default());
     }
-    let mut binary = BinaryTree::by_splits(boxes, BINARY_DEPTH);
-    let mut wide = collapse(&binary, 1);
-    if wide.height > MAX_TOP_HEIGHT {
+    let binary = BinaryTree::by_splits(boxes, BINARY_DEPTH);
+    let better = build_over(&binary.reinserted(boxes), leaves);
+    Ok(better.or_else(|| build_over(&binary, leaves)).unwrap_or_else(|| {
         // Halving takes at most 32 levels, of which each wide node spans three.
-        binary = BinaryTree::by_splits(boxes, 0);
-        wide = collapse_levels(&binary, 1);
-    }
-    Ok(laid_out(&binary, &wide, leaves))
+        let binary = BinaryTree::by_splits(boxes, 0);
+        laid_out(&binary, &collapse_levels(&binary, 1), leaves)
+    }))
 }
 
 /// The trees that `binary` over the leaves makes; `None` if one of them is too high.
