@@ -10,9 +10,8 @@ use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::spread_of;
 use crate::kernels::trace::node::{entered_children, framed_ray};
-use crate::kernels::trace::packet::Packet;
 use crate::kernels::trace::packet_walk::PacketScratch;
-use crate::kernels::trace::run::{PacketKernel, Work, for_each_ray, run_for_each_packet};
+use crate::kernels::trace::run::{PacketKernel, Wants, Work, for_each_ray, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
 
 /// Of the rays of chosen tiles. With PARAM_NEEDED the hits are final and the rays of an any-hit pass that ended
@@ -35,9 +34,8 @@ impl PacketKernel for Query<'_> {
     const NARROWS: bool = false;
 
     #[inline(always)]
-    fn takes(&self, slot: &mut Slot) -> bool {
-        let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
-        slot.is_traced() && !is_occluded && self.lists.nearest[slot.tile] <= slot.hit.t
+    fn wants(&self, tile: usize) -> Option<Wants> {
+        Some(Wants { unhit: self.bound.has(PARAM_ANY_HIT), reach: self.lists.nearest[tile], ..Wants::TRACED })
     }
 
     /// As [`needed`] for hits that are not final, where the rays that enter no child of a root are told together.
@@ -70,7 +68,7 @@ impl PacketKernel for Query<'_> {
 
     /// Their limits are no hits.
     #[inline(always)]
-    fn write<I: Isa>(&self, _: I, _: &Packet, _: &mut [Hit], _: &mut [Surface], _: &[u32]) {}
+    fn write<I: Isa>(&self, _: I, _: &mut PacketScratch, _: &mut [Hit], _: &mut [Surface], _: &[u32]) {}
 }
 
 /// What a ray needed, its hit being final.

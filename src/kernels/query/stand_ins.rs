@@ -3,17 +3,16 @@
 
 use super::query_all::{STAND_INS, ask};
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, Surface};
-use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, PARAM_ANY_HIT, Surface};
+use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::PairCounts;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::{is_pending, set_pending};
 use crate::kernels::trace::node::inner_before;
-use crate::kernels::trace::packet::Packet;
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::{PacketScratch, put, take, top_group};
-use crate::kernels::trace::run::{PacketKernel, Work, for_each_ray, run_for_each_packet};
+use crate::kernels::trace::run::{PacketKernel, Wants, Work, for_each_ray, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
 
 /// Of all rays: what stands in for what they would enter.
@@ -37,9 +36,9 @@ impl PacketKernel for Askers<'_> {
     const NARROWS: bool = false;
 
     #[inline(always)]
-    fn takes(&self, slot: &mut Slot) -> bool {
-        let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
-        slot.is_traced() && !is_occluded && is_pending(slot.surface) && self.bound.params.top_count != 0
+    fn wants(&self, _: usize) -> Option<Wants> {
+        let wants = Wants { pending: true, unhit: self.bound.has(PARAM_ANY_HIT), ..Wants::TRACED };
+        (self.bound.params.top_count != 0).then_some(wants)
     }
 
     #[inline(always)]
@@ -93,9 +92,16 @@ impl PacketKernel for Askers<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(&self, _: I, packet: &Packet, _: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+    fn write<I: Isa>(
+        &self,
+        _: I,
+        packets: &mut PacketScratch,
+        _: &mut [Hit],
+        surfaces: &mut [Surface],
+        places: &[u32],
+    ) {
         for (i, &at) in places.iter().enumerate() {
-            set_pending(&mut surfaces[at as usize], packet.done >> i & 1 != 0);
+            set_pending(&mut surfaces[at as usize], packets.packet.done >> i & 1 != 0);
         }
     }
 }

@@ -7,18 +7,18 @@ use crate::kernels::bound::{Bound, entry_bits};
 use crate::kernels::layout::{
     COUNTER_PAIRS_VISIBLE, COUNTER_STACK_OVERFLOW, Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEXT, Surface,
 };
-use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::simd::wide::Wide;
 use crate::kernels::tiles::PairCounts;
 use crate::kernels::trace::intersect_all::{IntersectAll, leading};
 use crate::kernels::trace::leaf::BrickRay;
-use crate::kernels::trace::levels::{is_pending, set_pending};
+use crate::kernels::trace::levels::set_pending;
 use crate::kernels::trace::node::{entered_children, inner_before};
 use crate::kernels::trace::packet::{Column, Packet, RAYS, Words};
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::{Entries, PacketScratch, Waiting};
-use crate::kernels::trace::run::{PacketKernel, Work, run_for_each_packet};
+use crate::kernels::trace::run::{PacketKernel, Wants, Work, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -64,9 +64,11 @@ struct Both<'a> {
 impl PacketKernel for Both<'_> {
     const NARROWS: bool = true;
 
+    const ASKS: bool = true;
+
     #[inline(always)]
-    fn takes(&self, slot: &mut Slot) -> bool {
-        self.wanted.takes(slot)
+    fn wants(&self, tile: usize) -> Option<Wants> {
+        self.wanted.wants(tile)
     }
 
     #[inline(always)]
@@ -84,9 +86,16 @@ impl PacketKernel for Both<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
-        self.intersect.write(isa, packet, hits, surfaces, places);
-        self.wanted.write(isa, packet, hits, surfaces, places);
+    fn write<I: Isa>(
+        &self,
+        isa: I,
+        packets: &mut PacketScratch,
+        hits: &mut [Hit],
+        surfaces: &mut [Surface],
+        places: &[u32],
+    ) {
+        self.intersect.write(isa, packets, hits, surfaces, places);
+        self.wanted.write(isa, packets, hits, surfaces, places);
     }
 }
 
@@ -101,15 +110,13 @@ pub struct First {
 impl PacketKernel for Wanted<'_> {
     const NARROWS: bool = true;
 
-    /// Has the ray be pending no more; those that ask for a brick become so again.
+    const ASKS: bool = true;
+
     #[inline(always)]
-    fn takes(&self, slot: &mut Slot) -> bool {
-        if !is_pending(slot.surface) {
-            return false;
-        }
-        set_pending(slot.surface, false);
-        let is_occluded = self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
-        slot.is_traced() && self.bound.params.top_count != 0 && !is_occluded
+    fn wants(&self, _: usize) -> Option<Wants> {
+        // No hit is as far as that.
+        let reach = if self.bound.params.top_count == 0 { f32::INFINITY } else { f32::NEG_INFINITY };
+        Some(Wants { pending: true, unhit: self.bound.has(PARAM_ANY_HIT), reach })
     }
 
     #[inline(always)]
@@ -119,11 +126,16 @@ impl PacketKernel for Wanted<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(&self, _: I, packet: &Packet, _: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+    fn write<I: Isa>(
+        &self,
+        _: I,
+        packets: &mut PacketScratch,
+        _: &mut [Hit],
+        surfaces: &mut [Surface],
+        places: &[u32],
+    ) {
         for (i, &at) in places.iter().enumerate() {
-            if packet.asking >> i & 1 != 0 {
-                set_pending(&mut surfaces[at as usize], true);
-            }
+            set_pending(&mut surfaces[at as usize], packets.packet.asking >> i & 1 != 0);
         }
     }
 }

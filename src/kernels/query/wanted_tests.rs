@@ -6,6 +6,7 @@ use crate::kernels::lamps::LampTables;
 use crate::kernels::layout::{self, Params, Ray};
 use crate::kernels::rays::start_hit;
 use crate::kernels::simd::isa::Best;
+use crate::kernels::trace::levels::is_pending;
 use crate::kernels::trace::node::{framed_ray, node_hits};
 
 /// What rays ask of bricks: how many rays ask for each, the least distance, and how many enter it before any other.

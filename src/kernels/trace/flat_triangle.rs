@@ -2,7 +2,7 @@
 
 use super::brick::Best;
 use super::leaf::BrickRay;
-use super::packet_triangle::{Met, Rays, meet, shear};
+use super::packet_triangle::{Met, Rays, ends, meet, shear};
 use super::walk_brick::Group;
 use crate::kernels::flat::{BLOCK, FlatBlock, FlatBrick};
 use crate::kernels::simd::isa::Isa;
@@ -52,8 +52,16 @@ impl BrickRay<'_> {
         let met = meet(
             #[inline(always)]
             |x| isa.eight(x),
-            [a, b, c],
             [sa, sb, sc],
+            #[inline(always)]
+            || {
+                let [low, high] = ends(
+                    #[inline(always)]
+                    |x| isa.eight(x),
+                    [a, b, c],
+                );
+                [low, high]
+            },
             &rays,
             lanes,
         );

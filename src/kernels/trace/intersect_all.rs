@@ -2,16 +2,14 @@
 //! `shaders/trace/intersect_all.wgsl`, for rays of one octant together. They walk the wide top-level tree and, in its
 //! leaves, the bricks.
 
-use super::levels::is_pending;
 use super::node::inner_before;
-use super::packet::Packet;
 use super::packet_node::Place;
 use super::packet_walk::{PacketScratch, put, take, top_group};
-use super::run::{PacketKernel, Work, run_for_each_packet};
+use super::run::{PacketKernel, Wants, Work, run_for_each_packet};
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, NONE, PARAM_ANY_HIT, Surface};
-use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::layout::{Hit, PARAM_ANY_HIT, Surface};
+use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::PairCounts;
 
@@ -72,11 +70,9 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
     const NARROWS: bool = SELECT;
 
     #[inline(always)]
-    fn takes(&self, slot: &mut Slot) -> bool {
-        let bound = self.bound;
-        let is_found = bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE;
-        let is_left_out = SELECT && (is_found || !is_pending(slot.surface));
-        slot.is_traced() && bound.params.top_count != 0 && !is_left_out
+    fn wants(&self, _: usize) -> Option<Wants> {
+        let unhit = SELECT && self.bound.has(PARAM_ANY_HIT);
+        (self.bound.params.top_count != 0).then_some(Wants { pending: SELECT, unhit, ..Wants::TRACED })
     }
 
     #[inline(always)]
@@ -121,7 +117,14 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
-        packet.write(isa, self.bound, hits, surfaces, places);
+    fn write<I: Isa>(
+        &self,
+        isa: I,
+        packets: &mut PacketScratch,
+        hits: &mut [Hit],
+        surfaces: &mut [Surface],
+        places: &[u32],
+    ) {
+        packets.write(isa, self.bound, hits, surfaces, places);
     }
 }

@@ -1,13 +1,12 @@
 //! Intersects rays of one octant with a run of the selected leaves of their tile, in their order: twin of
 //! `shaders/trace/intersect_list.wgsl`.
 
-use super::packet::Packet;
 use super::packet_walk::PacketScratch;
-use super::run::{PacketKernel, Work, run_for_each_packet};
+use super::run::{PacketKernel, Wants, Work, run_for_each_packet};
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Entry, Hit, NONE, PARAM_ANY_HIT, Surface};
-use crate::kernels::rays::{RaySet, Slot};
+use crate::kernels::layout::{Entry, Hit, PARAM_ANY_HIT, Surface};
+use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
 
@@ -41,9 +40,9 @@ impl PacketKernel for IntersectList<'_> {
     const NARROWS: bool = false;
 
     #[inline(always)]
-    fn takes(&self, slot: &mut Slot) -> bool {
-        let (next, end) = self.run_of(slot.tile);
-        next != end && slot.is_traced() && !(self.bound.has(PARAM_ANY_HIT) && slot.hit.id != NONE)
+    fn wants(&self, tile: usize) -> Option<Wants> {
+        let (next, end) = self.run_of(tile);
+        (next != end).then_some(Wants { unhit: self.bound.has(PARAM_ANY_HIT), ..Wants::TRACED })
     }
 
     #[inline(always)]
@@ -62,7 +61,14 @@ impl PacketKernel for IntersectList<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
-        packet.write(isa, self.bound, hits, surfaces, places);
+    fn write<I: Isa>(
+        &self,
+        isa: I,
+        packets: &mut PacketScratch,
+        hits: &mut [Hit],
+        surfaces: &mut [Surface],
+        places: &[u32],
+    ) {
+        packets.write(isa, self.bound, hits, surfaces, places);
     }
 }

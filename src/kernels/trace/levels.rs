@@ -24,7 +24,13 @@ fn square_of(v: Vec3) -> f32 {
 /// What the cone of a ray spreads by beyond its pass's, squared.
 #[inline(always)]
 pub fn spread_of(surface: &Surface) -> f32 {
-    f32::from_bits(surface.pending >> 1)
+    spread_in(surface.pending)
+}
+
+/// The same by [`Surface::pending`].
+#[inline(always)]
+pub fn spread_in(pending: u32) -> f32 {
+    f32::from_bits(pending >> 1)
 }
 
 /// Whether a ray may still ask for bricks.

@@ -2,34 +2,14 @@
 //! the same order. Hits on instances, and lanes whose numbers leave the range in which an f32 operation is what the
 //! kernel carries out in integers, are written alone.
 
-use super::brick::Best;
-use super::packet::{Packet, RAYS};
+use super::packet::{Column, Packet, RAYS, Words};
+use super::packet_walk::PacketScratch;
 use super::walk_brick::write_found;
 use crate::kernels::bound::Bound;
 use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, Surface};
-use crate::kernels::simd::isa::{Isa, inside};
+use crate::kernels::simd::isa::{Isa, MOST, inside};
 use crate::kernels::simd::wide::{Wide, three};
 use crate::math::exact::{LEAST_COORDINATE, LEAST_SHEAR, OFFSET_ULPS, THIRD};
-
-/// Most lanes of a vector.
-const MOST: usize = 16;
-
-/// A number a lane.
-type Lane = [f32; MOST];
-
-/// What is known of the hits of a vector: vertices a, b, c, by axis.
-type Corners<W> = [[W; 3]; 3];
-
-/// What follows from it.
-#[derive(Default)]
-struct Points {
-    /// [`crate::math::exact::offset_origin`] of it.
-    point: [Lane; 3],
-    normal: [Lane; 3],
-    area: Lane,
-    /// Weights of vertices b and c.
-    weights: [Lane; 2],
-}
 
 /// Quotients, and the lanes in which they are [`crate::math::exact::divide`]'s.
 #[inline(always)]
@@ -84,60 +64,173 @@ fn diffprod<I: Isa>(isa: I, a: I::Wide, b: I::Wide, c: I::Wide, d: I::Wide) -> (
     (difference, plain)
 }
 
-/// [`crate::math::exact::surface_point`], and the barycentrics. Returns the lanes that are right.
+/// What follows from triangles alone, one a lane: those that the rays of a packet have hit.
+pub struct Facts {
+    /// How many.
+    count: usize,
+    /// Vertices a, b, c by axes, in the frame.
+    corners: [[Column; 3]; 3],
+    /// Unit vectors across them, to either side.
+    normal: [Column; 3],
+    /// Twice the areas.
+    area: Column,
+    /// Lengths of the edges bc, ca, ab.
+    lengths: [Column; 3],
+    /// Which rays have hit each.
+    rays: [u64; RAYS],
+    /// Which of them each ray has hit.
+    of: Words,
+}
+
+impl Facts {
+    /// Of no triangles.
+    pub fn empty() -> Self {
+        let none = [Column::ZERO; 3];
+        Self {
+            count: 0,
+            corners: [none; 3],
+            normal: none,
+            area: Column::ZERO,
+            lengths: none,
+            rays: [0; RAYS],
+            of: Words([0; RAYS]),
+        }
+    }
+
+    /// Of what the rays of a packet have hit. Returns those whose facts are right; none of those on instances.
+    #[inline(always)]
+    fn gather<I: Isa>(&mut self, isa: I, bound: &Bound, packet: &Packet) -> u64 {
+        let (found, lanes) = (&packet.found, I::Wide::LANES);
+        let mut left = 0;
+        for v in 0..packet.vectors::<I>() {
+            let none = found.leaf.get(isa, v).same_bits(isa.splat_bits(NONE));
+            left |= u64::from(!none & (u32::MAX >> (32 - lanes))) << (v * lanes);
+        }
+        left &= packet.all();
+        (self.count, self.of) = (0, Words([0; RAYS]));
+        let mut right = 0;
+        while left != 0 {
+            let i = left.trailing_zeros() as usize % RAYS;
+            let (number, triangle) = (found.leaf.0[i], found.triangle.0[i]);
+            let mut same = 0;
+            for v in i / lanes..packet.vectors::<I>() {
+                let (leaves, triangles) = (found.leaf.get(isa, v), found.triangle.get(isa, v));
+                let both = leaves.same_bits(isa.splat_bits(number)) & triangles.same_bits(isa.splat_bits(triangle));
+                same |= u64::from(both) << (v * lanes);
+            }
+            same &= left;
+            left &= !same;
+            let leaf = &bound.scene.leaves[number as usize];
+            if bound.scene.instances[leaf.instance as usize].flags & INSTANCE_IDENTITY == 0 {
+                continue;
+            }
+            let brick = &bound.bricks[leaf.brick as usize];
+            let vertices = brick.vertices(triangle, leaf.offset_high, leaf.offset_low);
+            let at = self.count % RAYS;
+            for (columns, vertex) in self.corners.iter_mut().zip(vertices) {
+                for (column, x) in columns.iter_mut().zip(vertex) {
+                    column.0[at] = x;
+                }
+            }
+            let number = isa.splat_bits(at as u32);
+            for v in i / lanes..packet.vectors::<I>() {
+                self.of.replace(isa, v, (same >> (v * lanes)) as u32, number);
+            }
+            self.rays[at] = same;
+            self.count += 1;
+            right |= same;
+        }
+        for v in 0..self.count.div_ceil(lanes) {
+            let mut wrong = !self.follow(isa, v) & (u32::MAX >> (32 - lanes));
+            while wrong != 0 {
+                let at = v * lanes + wrong.trailing_zeros() as usize;
+                wrong &= wrong - 1;
+                right &= if at < self.count { !self.rays[at % RAYS] } else { u64::MAX };
+            }
+        }
+        right
+    }
+
+    /// Has facts of a vector of triangles follow from their vertices. Returns the lanes that are right.
+    #[inline(always)]
+    fn follow<I: Isa>(&mut self, isa: I, v: usize) -> u32 {
+        let [a, b, c] = three!(i => three!(k => self.corners[i][k].get(isa, v)));
+        let (ab, bc, ca) = (three!(k => b[k] - a[k]), three!(k => c[k] - b[k]), three!(k => a[k] - c[k]));
+        let (s0, right0) = diffprod(isa, ab[2], ca[1], ab[1], ca[2]);
+        let (s1, right1) = diffprod(isa, ab[0], ca[2], ab[2], ca[0]);
+        let (s2, right2) = diffprod(isa, ab[1], ca[0], ab[0], ca[1]);
+        let mut right = right0 & right1 & right2;
+        let s = [s0, s1, s2];
+        // Powers of two from the exponent of the largest component.
+        let largest = s[0].abs().most(s[1].abs().most(s[2].abs()));
+        right &= inside(isa, largest);
+        let scale = largest & isa.splat(f32::INFINITY);
+        let inverse = isa.splat(1.0) / scale;
+        let (zero, least) = (isa.splat(0.0), isa.splat(LEAST_SHEAR));
+        let s = three!(k => s[k] * inverse);
+        let s = three!(k => zero.or_else(s[k].abs().less(least), s[k]));
+        let (size, right_size) = length(isa, s);
+        right &= right_size;
+        let n = three!(k => divide(isa, s[k], size));
+        right &= n[0].1 & n[1].1 & n[2].1;
+        let lengths = [length(isa, bc), length(isa, ca), length(isa, ab)];
+        right &= lengths[0].1 & lengths[1].1 & lengths[2].1;
+        for k in 0..3 {
+            self.normal[k].set(v, n[k].0);
+            self.lengths[k].set(v, lengths[k].0);
+        }
+        self.area.set(v, size * scale);
+        right
+    }
+}
+
+/// Where the rays of a vector have hit, as rows.
+struct Points {
+    /// As of [`Hit`].
+    hits: [[f32; 4]; MOST],
+    /// As of [`Surface`]: point and leaf, normal and triangle,
+    surfaces: [[[f32; 4]; MOST]; 2],
+    /// and twice the areas of triangles.
+    areas: [f32; MOST],
+}
+
+/// [`crate::math::exact::surface_point`] of a vector of rays, [`crate::math::exact::offset_origin`] of it, and the
+/// barycentrics. Returns the lanes that are right where their triangles' facts are.
 #[inline(always)]
-fn points<I: Isa>(isa: I, packet: &Packet, number: usize, [a, b, c]: Corners<I::Wide>, out: &mut Points) -> u32 {
+fn points<I: Isa>(isa: I, packet: &Packet, facts: &Facts, number: usize, out: &mut Points) -> u32 {
+    let of = &facts.of.0[number * I::Wide::LANES..];
     let d = three!(k => packet.direction[k].get(isa, number));
-    let (ab, bc, ca) = (three!(k => b[k] - a[k]), three!(k => c[k] - b[k]), three!(k => a[k] - c[k]));
-    let (s0, plain0) = diffprod(isa, ab[2], ca[1], ab[1], ca[2]);
-    let (s1, plain1) = diffprod(isa, ab[0], ca[2], ab[2], ca[0]);
-    let (s2, plain2) = diffprod(isa, ab[1], ca[0], ab[0], ca[1]);
-    let mut plain = plain0 & plain1 & plain2;
-    let s = [s0, s1, s2];
-    // Powers of two from the exponent of the largest component.
-    let largest = s[0].abs().most(s[1].abs().most(s[2].abs()));
-    plain &= inside(isa, largest);
-    let scale = largest & isa.splat(f32::INFINITY);
-    let inverse = isa.splat(1.0) / scale;
-    let (zero, least) = (isa.splat(0.0), isa.splat(LEAST_SHEAR));
-    let s = three!(k => s[k] * inverse);
-    let s = three!(k => zero.or_else(s[k].abs().less(least), s[k]));
-    let (size, right) = length(isa, s);
-    plain &= right;
-    let n = three!(k => divide(isa, s[k], size));
-    plain &= n[0].1 & n[1].1 & n[2].1;
-    let n = three!(k => n[k].0);
+    let [a, b, c] = three!(i => three!(k => isa.pick(&facts.corners[i][k].0, of)));
+    let n = three!(k => isa.pick(&facts.normal[k].0, of));
+    let (zero, area) = (isa.splat(0.0), isa.pick(&facts.area.0, of));
     let away = zero.less(dot(n, d));
     let n = three!(k => (n[k] ^ isa.splat(-0.0)).or_else(away, n[k]));
     let down = three!(k => n[k].less(zero) | (n[k].less_equal(zero) & zero.less_equal(n[k]) & zero.less(d[k])));
 
-    let det = packet.found.det.get(isa, number);
-    let edges = three!(k => divide(isa, packet.found.edges[k].get(isa, number), det));
-    plain &= edges[0].1 & edges[1].1 & edges[2].1;
-    edges[1].0.store(&mut out.weights[0]);
-    edges[2].0.store(&mut out.weights[1]);
+    let found = &packet.found;
+    let det = found.det.get(isa, number);
+    let edges = three!(k => divide(isa, found.edges[k].get(isa, number), det));
+    let mut right = edges[0].1 & edges[1].1 & edges[2].1;
     let mut weights = three!(k => edges[k].0.abs());
     let reach = three!(k => dot(weights, [a[k].abs(), b[k].abs(), c[k].abs()]));
     let margin = isa.splat(4.0 * OFFSET_ULPS) * (reach[0] + reach[1] + reach[2]);
-    let area = size * scale;
-    let lengths = [length(isa, bc), length(isa, ca), length(isa, ab)];
-    let inset = three!(k => divide(isa, margin * lengths[k].0, area));
-    plain &= lengths[0].1 & lengths[1].1 & lengths[2].1 & inset[0].1 & inset[1].1 & inset[2].1;
+    let inset = three!(k => divide(isa, margin * isa.pick(&facts.lengths[k].0, of), area));
+    right &= inset[0].1 & inset[1].1 & inset[2].1;
     weights = three!(k => weights[k].most(inset[k].0.least(isa.splat(THIRD))));
     let total = weights[0] + weights[1] + weights[2];
     let parts = three!(k => divide(isa, weights[k], total));
-    plain &= parts[0].1 & parts[1].1 & parts[2].1;
+    right &= parts[0].1 & parts[1].1 & parts[2].1;
     weights = three!(k => parts[k].0);
     let near = three!(k => dot(weights, [a[k].abs(), b[k].abs(), c[k].abs()]));
     let delta = isa.splat(OFFSET_ULPS) * dot(three!(k => n[k].abs()), near);
     let p = three!(k => dot(weights, [a[k], b[k], c[k]]));
-    let moved = three!(k => offset(isa, p[k], delta * n[k], down[k]));
-    for k in 0..3 {
-        moved[k].store(&mut out.point[k]);
-        n[k].store(&mut out.normal[k]);
-    }
-    area.store(&mut out.area);
-    plain
+    let [x, y, z] = three!(k => offset(isa, p[k], delta * n[k], down[k]));
+    let (t, id) = (packet.t.get(isa, number), found.id.get(isa, number));
+    isa.rows([t, id, edges[1].0, edges[2].0], &mut out.hits);
+    isa.rows([x, y, z, found.leaf.get(isa, number)], &mut out.surfaces[0]);
+    isa.rows([n[0], n[1], n[2], found.triangle.get(isa, number)], &mut out.surfaces[1]);
+    area.store(&mut out.areas);
+    right
 }
 
 /// [`crate::math::exact::offset_origin`] on an axis.
@@ -153,81 +246,48 @@ fn offset<I: Isa>(isa: I, p: I::Wide, step: I::Wide, down: u32) -> I::Wide {
     moved.least(least).or_else(down, moved.most(least))
 }
 
-impl Packet {
+impl PacketScratch {
     /// Writes what ray i has found to the i-th of `places`.
     #[inline(always)]
-    pub fn write<I: Isa>(&self, isa: I, bound: &Bound, hits_of: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+    pub fn write<I: Isa>(&mut self, isa: I, bound: &Bound, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+        let packet = &self.packet;
+        let has_found = |i: usize| packet.found.leaf.0[i % RAYS] != NONE;
         if bound.has(PARAM_ANY_HIT) {
-            for i in (0..self.count).filter(|&i| self.found.leaf.0[i % RAYS] != NONE) {
+            for i in (0..packet.count).filter(|&i| has_found(i)) {
                 let place = places[i] as usize;
-                self.best(i).write_occluder(&mut hits_of[place], &mut surfaces[place]);
+                packet.best(i).write_occluder(&mut hits[place], &mut surfaces[place]);
             }
             return;
         }
-        let mut points_of = Points::default();
-        for v in 0..self.vectors::<I>() {
+        let right = self.facts.gather(isa, bound, packet);
+        let none = [[0.0; 4]; MOST];
+        let mut points_of = Points { hits: none, surfaces: [none; 2], areas: [0.0; MOST] };
+        for v in 0..packet.vectors::<I>() {
             let first = v * I::Wide::LANES;
-            let end = self.count.min(first + I::Wide::LANES);
-            let (mut together, corners) = self.corners(isa, bound, v, end - first);
+            let mut together = (right >> first) as u32 & (u32::MAX >> (32 - I::Wide::LANES));
             if together != 0 {
-                together &= points(isa, self, v, corners, &mut points_of);
+                together &= points(isa, packet, &self.facts, v, &mut points_of);
             }
-            for i in first..end {
-                if self.found.leaf.0[i % RAYS] == NONE {
-                    continue;
-                }
-                let (hit, surface) = (&mut hits_of[places[i] as usize], &mut surfaces[places[i] as usize]);
+            for i in (first..packet.count.min(first + I::Wide::LANES)).filter(|&i| has_found(i)) {
+                let (hit, surface) = (&mut hits[places[i] as usize], &mut surfaces[places[i] as usize]);
                 if together >> (i - first) & 1 != 0 {
-                    points_of.write(i - first, &self.best(i), hit, surface);
+                    points_of.write(i - first, hit, surface);
                     bound.start_off(surface);
                 } else {
-                    write_found(bound, &self.ray(i), &self.best(i), hit, surface);
+                    write_found(bound, &packet.ray(i), &packet.best(i), hit, surface);
                 }
             }
         }
-    }
-
-    /// The vertices of what the first lanes of vector `v` have hit, and which lanes have; none where the hit lies on an
-    /// instance. Neighbours often hit the same triangle, so each is looked up once.
-    #[inline(always)]
-    fn corners<I: Isa>(&self, isa: I, bound: &Bound, v: usize, lanes: usize) -> (u32, Corners<I::Wide>) {
-        let (leaves, triangles) = (self.found.leaf.get(isa, v), self.found.triangle.get(isa, v));
-        let mut corners = [[isa.splat(0.0); 3]; 3];
-        let mut left = !leaves.same_bits(isa.splat_bits(NONE)) & (u32::MAX >> (32 - lanes));
-        let mut found = 0;
-        while left != 0 {
-            let i = (v * I::Wide::LANES + left.trailing_zeros() as usize) % RAYS;
-            let (number, triangle) = (self.found.leaf.0[i], self.found.triangle.0[i]);
-            let same = leaves.same_bits(isa.splat_bits(number)) & triangles.same_bits(isa.splat_bits(triangle)) & left;
-            left &= !same;
-            let leaf = &bound.scene.leaves[number as usize];
-            if bound.scene.instances[leaf.instance as usize].flags & INSTANCE_IDENTITY == 0 {
-                continue;
-            }
-            found |= same;
-            let brick = &bound.bricks[leaf.brick as usize];
-            let vertices = brick.vertices(triangle, leaf.offset_high, leaf.offset_low);
-            corners = three!(i => three!(k => isa.splat(vertices[i][k]).or_else(same, corners[i][k])));
-        }
-        (found, corners)
     }
 }
 
 impl Points {
+    /// Writes a lane: all but what was known of the ray before.
     #[inline(always)]
-    fn write(&self, lane: usize, best: &Best, hit: &mut Hit, surface: &mut Surface) {
+    fn write(&self, lane: usize, hit: &mut Hit, surface: &mut Surface) {
         let lane = lane % MOST;
-        let at = |from: &[Lane; 3]| [from[0][lane], from[1][lane], from[2][lane]];
-        *hit = Hit { t: best.t, id: best.id, u: self.weights[0][lane], v: self.weights[1][lane] };
-        *surface = Surface {
-            point: at(&self.point),
-            leaf: best.leaf,
-            normal: at(&self.normal),
-            triangle: best.triangle,
-            area: self.area[lane],
-            source: best.source,
-            pending: surface.pending,
-            emitter: surface.emitter,
-        };
+        *hit = bytemuck::cast(self.hits[lane]);
+        let [point, normal, rest]: &mut [[f32; 4]; 3] = bytemuck::cast_mut(surface);
+        (*point, *normal, rest[0]) = (self.surfaces[0][lane], self.surfaces[1][lane], self.areas[lane]);
     }
 }

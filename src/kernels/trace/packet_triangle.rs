@@ -5,6 +5,7 @@
 use super::hidden::is_hidden;
 use super::leaf::BrickRay;
 use super::packet::{Packet, RAYS, turned};
+use crate::kernels::flat::{BLOCK, FlatBlock};
 use crate::kernels::simd::isa::{INSIDE, Isa};
 use crate::kernels::simd::wide::{Wide, three};
 use crate::kernels::vector::{Vec3, each};
@@ -15,7 +16,65 @@ impl Packet {
     /// does. With `any_hit` the rays that it ends are done.
     #[inline(always)]
     pub fn test_triangle<I: Isa>(&mut self, isa: I, r: &BrickRay, triangle: u32, rays: u64, any_hit: bool) -> bool {
-        let [a, b, c] = r.vertices(triangle);
+        let corners = r.vertices(triangle);
+        self.test(
+            isa,
+            r,
+            triangle,
+            (rays, any_hit),
+            #[inline(always)]
+            |packet, v| {
+                let origin = three!(k => packet.origin[k].get(isa, v));
+                three!(i => three!(k => isa.splat(corners[i][k]) - origin[k]))
+            },
+            #[inline(always)]
+            |corners| {
+                ends(
+                    #[inline(always)]
+                    |x| isa.splat(x),
+                    corners,
+                )
+            },
+        )
+    }
+
+    /// The same with a triangle of a block that rays from one point have seen.
+    #[inline(always)]
+    pub fn test_seen<I: Isa>(
+        &mut self,
+        isa: I,
+        r: &BrickRay,
+        (seen, triangle): (&Seen, u32),
+        rays: u64,
+        any_hit: bool,
+    ) -> bool {
+        let lane = triangle as usize % BLOCK;
+        self.test(
+            isa,
+            r,
+            triangle,
+            (rays, any_hit),
+            #[inline(always)]
+            |_, _| three!(i => three!(k => isa.splat(seen.corners[i][k][lane]))),
+            #[inline(always)]
+            |_| {
+                let end = &seen.ends;
+                [three!(k => isa.splat(end[0][k][lane])), three!(k => isa.splat(end[1][k][lane]))]
+            },
+        )
+    }
+
+    /// Tests a triangle, of which rays of a vector see these corners, and [`ends`] of them.
+    #[inline(always)]
+    fn test<I: Isa>(
+        &mut self,
+        isa: I,
+        r: &BrickRay,
+        triangle: u32,
+        (rays, any_hit): (u64, bool),
+        corners: impl Fn(&Self, usize) -> [[I::Wide; 3]; 3],
+        ends: impl Fn([[I::Wide; 3]; 3]) -> [[I::Wide; 3]; 2],
+    ) -> bool {
         let mut is_nearer = false;
         for v in 0..self.vectors::<I>() {
             let shift = v * I::Wide::LANES;
@@ -23,8 +82,7 @@ impl Packet {
             if lanes == 0 {
                 continue;
             }
-            let origin = three!(k => self.origin[k].get(isa, v));
-            let (a, b, c) = (relative(isa, a, origin), relative(isa, b, origin), relative(isa, c, origin));
+            let [a, b, c] = corners(self, v);
             let axes = self.axes(shift, I::Wide::LANES);
             let by = [self.shear[0].get(isa, v), self.shear[1].get(isa, v)];
             let sa = shear(turned::<I>(a, self.axis, axes), by);
@@ -39,8 +97,9 @@ impl Packet {
             let met = meet(
                 #[inline(always)]
                 |x| isa.splat(x),
-                [a, b, c],
                 [sa, sb, sc],
+                #[inline(always)]
+                || ends([a, b, c]),
                 &rays,
                 lanes,
             );
@@ -156,13 +215,13 @@ pub struct Met<W> {
     pub values: [W; 5],
 }
 
-/// [`intersect_triangle`] lane by lane: vertices as seen from the origins, and the same turned and sheared. `None`: no
+/// [`intersect_triangle`] lane by lane: vertices as seen from the origins, turned and sheared, and [`ends`]. `None`: no
 /// lane hits.
 #[inline(always)]
 pub fn meet<W: Wide>(
     splat: impl Fn(f32) -> W,
-    [a, b, c]: [[W; 3]; 3],
     [sa, sb, sc]: [[W; 3]; 3],
+    ends: impl FnOnce() -> [[W; 3]; 2],
     rays: &Rays<W>,
     lanes: u32,
 ) -> Option<Met<W>> {
@@ -189,12 +248,9 @@ pub fn meet<W: Wide>(
     if hit | alone == 0 {
         return None;
     }
-    let low = three!(k => a[k].least(b[k].least(c[k])));
-    let high = three!(k => a[k].most(b[k].most(c[k])));
-    let m = three!(k => low[k].abs().most(high[k].abs()));
-    let e = splat(CLAMP_ULPS) * m[0].most(m[1].most(m[2]));
-    let t0 = three!(k => (low[k] - e) * rays.inverse[k]);
-    let t1 = three!(k => (high[k] + e) * rays.inverse[k]);
+    let [low, high] = ends();
+    let t0 = three!(k => low[k] * rays.inverse[k]);
+    let t1 = three!(k => high[k] * rays.inverse[k]);
     let near = three!(k => t0[k].least(t1[k]));
     let far = three!(k => t0[k].most(t1[k]));
     let n = near[0].most(near[1].most(near[2]));
@@ -205,10 +261,46 @@ pub fn meet<W: Wide>(
     Some(Met { hit, alone, values: [t, u, v, w, det] })
 }
 
-/// A vertex as seen from the origins.
+/// The box that distances to a triangle are clamped to, lower and upper ends: its own, widened by the error of
+/// distances, as seen from the origins.
 #[inline(always)]
-fn relative<I: Isa>(isa: I, x: Vec3, origin: [I::Wide; 3]) -> [I::Wide; 3] {
-    three!(k => isa.splat(x[k]) - origin[k])
+pub fn ends<W: Wide>(splat: impl Fn(f32) -> W, [a, b, c]: [[W; 3]; 3]) -> [[W; 3]; 2] {
+    let low = three!(k => a[k].least(b[k].least(c[k])));
+    let high = three!(k => a[k].most(b[k].most(c[k])));
+    let m = three!(k => low[k].abs().most(high[k].abs()));
+    let e = splat(CLAMP_ULPS) * m[0].most(m[1].most(m[2]));
+    [three!(k => low[k] - e), three!(k => high[k] + e)]
+}
+
+/// The triangles of a block as rays from one point see them, one a lane.
+#[derive(Default)]
+pub struct Seen {
+    /// Vertices by axes.
+    corners: [[[f32; BLOCK]; 3]; 3],
+    /// [`ends`].
+    ends: [[[f32; BLOCK]; 3]; 2],
+}
+
+impl Seen {
+    /// Has the rays of a packet look at a block that lies at an offset.
+    #[inline(always)]
+    pub fn look<I: Isa>(&mut self, isa: I, packet: &Packet, block: &FlatBlock, offset: Vec3) {
+        let bounds = &packet.bounds;
+        let (offset, origin) = (three!(k => isa.eight(offset[k])), three!(k => isa.eight(bounds.origin[0][k])));
+        let corners = three!(i => three!(k => (isa.load_eight(&block.vertices[i][k]) + offset[k]) - origin[k]));
+        let ends = ends(
+            #[inline(always)]
+            |x| isa.eight(x),
+            corners,
+        );
+        for k in 0..3 {
+            for i in 0..3 {
+                corners[i][k].store(&mut self.corners[i][k]);
+            }
+            ends[0][k].store(&mut self.ends[0][k]);
+            ends[1][k].store(&mut self.ends[1][k]);
+        }
+    }
 }
 
 /// [`crate::math::exact::shear`] of components in their order.

@@ -5,10 +5,12 @@ use super::leaf::BrickRay;
 use super::packet::{Column, Packet};
 use super::packet_flat::Sights;
 use super::packet_node::Place;
+use super::packet_surface::Facts;
+use super::packet_triangle::Seen;
 use super::scratch::Scratch;
 use super::walk_brick::{Group, STACK_SIZE, Stack, Visits};
 use crate::kernels::bound::{Bound, Tally};
-use crate::kernels::flat::{FlatBrick, FlatNode};
+use crate::kernels::flat::{BLOCK, FlatBrick, FlatNode};
 use crate::kernels::layout::{COUNTER_STACK_OVERFLOW, INSTANCE_IDENTITY, NONE};
 use crate::kernels::simd::isa::{Isa, Lanes};
 
@@ -42,6 +44,10 @@ pub struct PacketScratch {
     pub top: PacketStack,
     /// What the rays add to the boxes of the brick that they are in.
     pub sights: Sights,
+    /// Triangles that rays from one point have seen.
+    seen: Seen,
+    /// What follows from the triangles that they have hit.
+    pub facts: Facts,
     /// Nodes that a ray is to visit by itself.
     open: FlatStack,
     /// Visits of all rays.
@@ -79,7 +85,17 @@ impl Default for PacketScratch {
         let open = [FlatOpen::default(); STACK_SIZE];
         let none = [Column::ZERO; 8];
         let entries = Entries { children: none, root: none, brick: Column::ZERO, waiting: Vec::new() };
-        Self { packet, bricks: stack, top: stack, sights, open, visits, entries }
+        Self {
+            packet,
+            bricks: stack,
+            top: stack,
+            sights,
+            seen: Seen::default(),
+            facts: Facts::empty(),
+            open,
+            visits,
+            entries,
+        }
     }
 }
 
@@ -256,6 +272,12 @@ impl PacketScratch {
     #[inline(always)]
     fn test_triangles<I: Isa>(&mut self, isa: I, r: &BrickRay, group: Group, testing: &[u64; 32], any_hit: bool) {
         let (mut triangles, mut is_nearer) = (group.bits, false);
+        if let Some(flat) = r.brick.flat
+            && self.packet.bounds.is_point
+        {
+            triangles = 0;
+            is_nearer = self.test_seen(isa, (r, flat), group, testing, any_hit);
+        }
         while triangles != 0 {
             let bit = triangles.trailing_zeros();
             triangles &= triangles - 1;
@@ -265,6 +287,39 @@ impl PacketScratch {
         if is_nearer {
             self.packet.shorten(isa);
         }
+    }
+
+    /// [`PacketScratch::test_triangles`] with rays that begin at one point, block by block: whether hits have come
+    /// nearer.
+    #[inline(always)]
+    fn test_seen<I: Isa>(
+        &mut self,
+        isa: I,
+        (r, flat): (&BrickRay, &FlatBrick),
+        group: Group,
+        testing: &[u64; 32],
+        any_hit: bool,
+    ) -> bool {
+        let (mut number, skipped) = (group.base / BLOCK as u32, group.base % BLOCK as u32);
+        let mut is_nearer = false;
+        // At most 24 triangles, from one of 8 lanes on.
+        let (mut left, mut first) = (group.bits << skipped, 0);
+        while left != 0 {
+            let mut lanes = left & 0xff;
+            if lanes != 0 {
+                self.seen.look(isa, &self.packet, &flat.blocks[number as usize], r.offset_high);
+            }
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros();
+                lanes &= lanes - 1;
+                let rays = testing[(first + lane - skipped) as usize % 32] & !self.packet.done;
+                let triangle = number * BLOCK as u32 + lane;
+                is_nearer |= self.packet.test_seen(isa, r, (&self.seen, triangle), rays, any_hit);
+            }
+            left >>= BLOCK;
+            (number, first) = (number + 1, first + BLOCK as u32);
+        }
+        is_nearer
     }
 
     /// [`PacketScratch::open_node`] of a brick that is flat.

@@ -1,9 +1,9 @@
 //! How kernels run over the rays of a set: bands of rows in parallel, in each blocks of neighbours, ray by ray or in
 //! packets.
 
-use super::levels::is_pending;
+use super::levels::set_pending;
 use super::node::octant;
-use super::packet::{Packet, RAYS};
+use super::packet::{Known, Packet, RAYS, Taken, four_of_square};
 use super::packet_walk::PacketScratch;
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
@@ -15,6 +15,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Edge of the blocks of rays that one thread traces in a row.
 const BLOCK: usize = 8;
+
+/// Calls `visit` with the number of each bit that is set.
+#[inline(always)]
+fn for_each_set(mut bits: u64, mut visit: impl FnMut(usize)) {
+    while bits != 0 {
+        visit(bits.trailing_zeros() as usize);
+        bits &= bits - 1;
+    }
+}
 
 /// Whose rays a kernel runs over.
 #[derive(Clone, Copy)]
@@ -100,6 +109,14 @@ impl Block {
         }
     }
 
+    /// The number of the first ray of a square that has all 64, within the band of rows of `width`.
+    #[inline(always)]
+    fn whole(&self, width: usize, square: usize) -> Option<usize> {
+        let across = self.columns.div_ceil(BLOCK);
+        let (column, row) = (square % across * BLOCK, square / across * BLOCK);
+        (column + BLOCK <= self.columns && row + BLOCK <= self.rows).then_some(row * width + self.first + column)
+    }
+
     /// The bit of a ray of the band within its square.
     #[inline(always)]
     fn bit_of(width: usize, at: usize) -> u64 {
@@ -125,14 +142,9 @@ struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Brings what is known of a ray near, if there is one.
     #[inline(always)]
-    fn prefetch<I: Isa>(&self, isa: I, at: usize) {
-        if let (Some(ray), Some(hit), Some(surface)) = (self.rays.get(at), self.hits.get(at), self.surfaces.get(at)) {
-            isa.prefetch(ray);
-            isa.prefetch(hit);
-            isa.prefetch(surface);
-        }
+    fn known(&self) -> Known<'_> {
+        Known { rays: self.rays, hits: self.hits, surfaces: self.surfaces }
     }
 
     #[inline(always)]
@@ -183,20 +195,62 @@ pub fn for_each_ray(set: &mut RaySet, bound: &Bound, work: Work, kernel: impl Fn
     });
 }
 
+/// Which of the rays that are traced a kernel does something for.
+#[derive(Clone, Copy)]
+pub struct Wants {
+    /// Those alone that are pending,
+    pub pending: bool,
+    /// that have hit nothing so far,
+    pub unhit: bool,
+    /// and whose hits are not nearer than this.
+    pub reach: f32,
+}
+
+impl Wants {
+    /// All of them.
+    pub const TRACED: Self = Self { pending: false, unhit: false, reach: f32::NEG_INFINITY };
+
+    /// Of the rays that a packet has taken those that are wanted.
+    #[inline(always)]
+    fn of<I: Isa>(&self, isa: I, packet: &Packet, taken: &Taken) -> u64 {
+        let mut rays = taken.traced;
+        if self.pending {
+            rays &= taken.pending;
+        }
+        if self.unhit {
+            rays &= taken.unhit;
+        }
+        if self.reach > f32::NEG_INFINITY {
+            rays &= packet.reaching(isa, self.reach);
+        }
+        rays
+    }
+}
+
 /// A kernel that rays of one octant run together, compiled for every instruction set. Implementations are always
 /// inlined, so that all of it is.
 pub trait PacketKernel: Sync {
     /// Whether it takes pending rays alone. [`RaySet::waiting`] is narrowed to those then.
     const NARROWS: bool;
 
-    /// Whether it does anything for a ray together with others.
-    fn takes(&self, slot: &mut Slot) -> bool;
+    /// Whether rays that it has seen pending are so no more, but for those of which it writes that they are.
+    const ASKS: bool = false;
+
+    /// Which rays of a tile it does anything for; `None`: for none.
+    fn wants(&self, tile: usize) -> Option<Wants>;
 
     /// Runs it for the rays of the packet, which are of the tile; what they find stays with them.
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize);
 
     /// Writes what ray i of the packet has found to the i-th of `places`.
-    fn write<I: Isa>(&self, isa: I, packet: &Packet, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]);
+    fn write<I: Isa>(
+        &self,
+        isa: I,
+        packets: &mut PacketScratch,
+        hits: &mut [Hit],
+        surfaces: &mut [Surface],
+        places: &[u32],
+    );
 }
 
 /// Edge of the blocks whose rays are made packets of, those that go in much the same direction together.
@@ -257,28 +311,24 @@ impl<K: PacketKernel> isa::Work for OfBlock<'_, '_, '_, K> {
 
 /// Makes packets of a block's rays and runs them.
 #[inline(always)]
-fn run_block<I: Isa>(
+fn run_block<I: Isa, K: PacketKernel>(
     isa: I,
     bound: &Bound,
-    kernel: &impl PacketKernel,
+    kernel: &K,
     task: &mut Task,
     band: &mut Band,
     block: Block,
 ) {
+    let Some(wants) = kernel.wants(block.tile) else { return };
     let mut packets = task.packets.take().unwrap_or_default();
     let mut groups = task.groups.take().unwrap_or_default();
     groups.clear();
-    while groups.next(isa, bound, kernel, band, &block) {
+    let width = bound.params.width as usize;
+    while groups.next::<I, K>(isa, &wants, (band, &block, width), &mut packets.packet) {
         let places = &groups.places[..groups.count];
-        packets.packet.clear(groups.octant as u32);
-        for &at in places {
-            let slot = band.slot(block.tile, at as usize);
-            packets.packet.add(slot.ray, slot.hit, slot.surface);
-        }
-        packets.packet.seal(isa);
         kernel.run_packet(isa, &mut task.scratch, &mut packets, block.tile);
         packets.count(bound, &mut task.scratch.tally);
-        kernel.write(isa, &packets.packet, band.hits, band.surfaces, places);
+        kernel.write(isa, &mut packets, band.hits, band.surfaces, places);
     }
     (task.packets, task.groups) = (Some(packets), Some(groups));
 }
@@ -296,8 +346,7 @@ struct Groups {
     counts: [usize; CELLS],
     /// How many have been taken.
     taken: usize,
-    /// The group: its octant and the places of its rays.
-    octant: usize,
+    /// The group: the places of its rays.
     count: usize,
     places: [u32; RAYS],
 }
@@ -305,7 +354,7 @@ struct Groups {
 impl Default for Groups {
     fn default() -> Self {
         let (waiting, sorted, places) = ([(0, 0); BLOCK_RAYS], [0; BLOCK_RAYS], [0; RAYS]);
-        Self { square: 0, waiting, sorted, counts: [0; CELLS], taken: 0, octant: 0, count: 0, places }
+        Self { square: 0, waiting, sorted, counts: [0; CELLS], taken: 0, count: 0, places }
     }
 }
 
@@ -332,57 +381,90 @@ impl Groups {
         (self.square, self.counts, self.taken) = (0, [0; CELLS], 0);
     }
 
-    /// Has a ray be of the group, if `kernel` does anything for it.
+    /// Has a packet take the rays of a square, but for those that are known not to be pending: which of them are
+    /// wanted, and what is seen of them.
     #[inline(always)]
-    fn look(&mut self, kernel: &impl PacketKernel, slot: &mut Slot, at: usize, octants: &mut u32) {
-        if kernel.takes(slot) {
-            self.places[self.count % RAYS] = at as u32;
-            *octants |= 1 << (octant(slot.ray.direction) % 8);
-            self.count += 1;
+    fn look<I: Isa, K: PacketKernel>(
+        &mut self,
+        isa: I,
+        wants: &Wants,
+        (band, block, width): (&mut Band, &Block, usize),
+        packet: &mut Packet,
+    ) -> (u64, Taken) {
+        let (mut bits, mut word) = (u64::MAX, None);
+        if K::NARROWS {
+            let of = &band.waiting[block.number_of(width, self.square)];
+            (bits, word) = (of.load(Ordering::Relaxed), Some(of));
         }
+        let whole = if bits == u64::MAX { block.whole(width, self.square) } else { None };
+        if let Some(at) = whole {
+            self.count = RAYS;
+            for (four, places) in self.places.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                let first = (at + four_of_square(four, width)) as u32;
+                *places = [first, first + 1, first + 2, first + 3];
+            }
+        } else {
+            self.count = 0;
+            block.for_each_bit(width, self.square, bits, |at| {
+                self.places[self.count % RAYS] = at as u32;
+                self.count += 1;
+            });
+        }
+        let places = &self.places[..self.count];
+        let known = band.known();
+        let taken = match whole {
+            Some(at) => packet.fill_square(isa, (at, width), known),
+            None if places.is_empty() => Taken::default(),
+            None => packet.fill(isa, places, known),
+        };
+        let wanted = wants.of(isa, packet, &taken);
+        if let Some(word) = word {
+            let mut left = taken.pending;
+            if whole.is_none() {
+                left = 0;
+                for_each_set(taken.pending, |i| left |= Block::bit_of(width, places[i % RAYS] as usize));
+            }
+            if left != bits {
+                word.store(left, Ordering::Relaxed);
+            }
+        }
+        if K::ASKS {
+            for_each_set(taken.pending & !wanted, |i| {
+                set_pending(&mut band.surfaces[places[i % RAYS] as usize], false)
+            });
+        }
+        (wanted, taken)
     }
 
-    /// Takes the next group of rays for which `kernel` does anything. False: there is none.
+    /// Has a packet take the next group of rays that are wanted. False: there is none.
     #[inline(always)]
     fn next<I: Isa, K: PacketKernel>(
         &mut self,
         isa: I,
-        bound: &Bound,
-        kernel: &K,
-        band: &mut Band,
-        block: &Block,
+        wants: &Wants,
+        (band, block, width): (&mut Band, &Block, usize),
+        packet: &mut Packet,
     ) -> bool {
-        let width = bound.params.width as usize;
         while self.square < block.squares() {
-            let mut octants = 0u32;
-            self.count = 0;
-            if K::NARROWS {
-                let word = &band.waiting[block.number_of(width, self.square)];
-                let bits = word.load(Ordering::Relaxed);
-                let is_full = bits == u64::MAX;
-                let mut left = 0;
-                block.for_each_bit(width, self.square, bits, |at| {
-                    if is_full {
-                        band.prefetch(isa, at + BLOCK);
-                    }
-                    let mut slot = band.slot(block.tile, at);
-                    if is_pending(slot.surface) {
-                        left |= Block::bit_of(width, at);
-                        self.look(kernel, &mut slot, at, &mut octants);
-                    }
-                });
-                if left != bits {
-                    word.store(left, Ordering::Relaxed);
-                }
-            } else {
-                block.for_each_place(width, self.square, |at| {
-                    band.prefetch(isa, at + BLOCK);
-                    self.look(kernel, &mut band.slot(block.tile, at), at, &mut octants);
+            let (wanted, taken) = self.look::<I, K>(isa, wants, (&mut *band, block, width), packet);
+            self.square += 1;
+            if wanted == 0 {
+                continue;
+            }
+            let octant = taken.octant(wanted).filter(|_| wanted.count_ones() as usize >= LEAST_SQUARE);
+            if wanted != packet.all() || octant.is_none() {
+                let all = self.places;
+                self.count = 0;
+                for_each_set(wanted, |i| {
+                    self.places[self.count % RAYS] = all[i % RAYS];
+                    self.count += 1;
                 });
             }
-            self.square += 1;
-            if octants.is_power_of_two() && self.count >= LEAST_SQUARE {
-                self.octant = octants.trailing_zeros() as usize;
+            if let Some(octant) = octant {
+                if wanted != packet.all() {
+                    packet.fill(isa, &self.places[..self.count], band.known());
+                }
+                packet.seal(isa, octant);
                 return true;
             }
             let waiting: usize = self.counts.iter().sum();
@@ -401,9 +483,11 @@ impl Groups {
         for (octant, counts) in self.counts.chunks(CELLS / 8).enumerate() {
             end += counts.iter().sum::<usize>();
             if self.taken < end {
-                (self.octant, self.count) = (octant, (end - self.taken).min(RAYS));
+                self.count = (end - self.taken).min(RAYS);
                 self.places[..self.count].copy_from_slice(&self.sorted[self.taken..self.taken + self.count]);
                 self.taken += self.count;
+                packet.fill(isa, &self.places[..self.count], band.known());
+                packet.seal(isa, octant as u32);
                 return true;
             }
         }

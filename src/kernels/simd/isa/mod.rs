@@ -26,6 +26,9 @@ impl Lanes {
     }
 }
 
+/// Most lanes of a vector.
+pub const MOST: usize = 16;
+
 /// What nodes are tested by. A value of the type is proof that the processor has the instructions.
 pub trait Isa: Copy + Send + Sync {
     /// Numbers of several rays.
@@ -65,6 +68,38 @@ pub trait Isa: Copy + Send + Sync {
     #[inline(always)]
     fn load_bits(self, from: &[u32]) -> Self::Wide {
         self.load(bytemuck::cast_slice(from))
+    }
+
+    /// The columns of a matrix, of whose rows the first count, one a lane.
+    #[inline(always)]
+    fn columns(self, rows: &[&[f32; 4]; MOST]) -> [Self::Wide; 4] {
+        let mut of = [[0.0; MOST]; 4];
+        for i in 0..MOST {
+            (of[0][i], of[1][i], of[2][i], of[3][i]) = (rows[i][0], rows[i][1], rows[i][2], rows[i][3]);
+        }
+        [self.load(&of[0]), self.load(&of[1]), self.load(&of[2]), self.load(&of[3])]
+    }
+
+    /// The rows of a matrix, one a lane of its columns, to the first of `rows`.
+    #[inline(always)]
+    fn rows(self, columns: [Self::Wide; 4], rows: &mut [[f32; 4]; MOST]) {
+        let mut of = [[0.0; MOST]; 4];
+        for k in 0..4 {
+            columns[k].store(&mut of[k]);
+        }
+        for i in 0..MOST {
+            rows[i] = [of[0][i], of[1][i], of[2][i], of[3][i]];
+        }
+    }
+
+    /// Numbers of a table: those at the first of `at`, one a lane, which are less than 64.
+    #[inline(always)]
+    fn pick(self, from: &[f32; 64], at: &[u32]) -> Self::Wide {
+        let mut picked = [0.0; MOST];
+        for i in 0..Self::Wide::LANES {
+            picked[i] = from[at[i] as usize % 64];
+        }
+        self.load(&picked)
     }
 
     /// Asks for the memory of `at` to be brought near, for it will be read.
@@ -152,7 +187,7 @@ impl Isa for Scalar {
 /// instructions.
 #[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 macro_rules! isa_over_intrinsics {
-    ($name:ident, $wide:ty, $eight:ty) => {
+    ($name:ident, $wide:ty, $eight:ty $(; $($own:tt)*)?) => {
         impl Isa for $name {
             type Wide = $wide;
             type Eight = $eight;
@@ -175,6 +210,8 @@ macro_rules! isa_over_intrinsics {
             ) -> NodeHits {
                 hits(ray, lanes, node, slack, t_max)
             });
+
+            $($($own)*)?
 
             #[inline(always)]
             fn prefetch<T>(self, at: &T) {

@@ -91,3 +91,37 @@ fn compare_with_scalar(isa: impl Isa) {
     }
     assert!((10_000..190_000).contains(&entered), "{entered} of 200,000 rays enter a child");
 }
+
+#[test]
+fn matrices_are_turned_and_tables_looked_up_number_by_number() {
+    for_each_isa!(isa => compare_with_loops(isa));
+}
+
+fn compare_with_loops<I: Isa>(isa: I) {
+    let lanes = I::Wide::LANES;
+    let mut rng = Rng(12);
+    for case in 0..200 {
+        // Any words: what is no number, too.
+        let table: [f32; 64] = std::array::from_fn(|_| f32::from_bits(rng.bits() as u32));
+        let rows: [&[f32; 4]; MOST] = std::array::from_fn(|i| table[4 * i..].first_chunk().unwrap());
+        let columns = isa.columns(&rows);
+        for (k, column) in columns.into_iter().enumerate() {
+            let mut stored = [0.0; MOST];
+            column.store(&mut stored);
+            for i in 0..lanes {
+                assert_eq!(stored[i].to_bits(), rows[i][k].to_bits(), "case {case}, column {k}, row {i}");
+            }
+        }
+        let mut back = [[0.0; 4]; MOST];
+        isa.rows(columns, &mut back);
+        for i in 0..lanes {
+            assert_eq!(back[i].map(f32::to_bits), rows[i].map(f32::to_bits), "case {case}, row {i}");
+        }
+        let at: [u32; MOST] = std::array::from_fn(|_| rng.bits() as u32 % 64);
+        let mut picked = [0.0; MOST];
+        isa.pick(&table, &at).store(&mut picked);
+        for i in 0..lanes {
+            assert_eq!(picked[i].to_bits(), table[at[i] as usize].to_bits(), "case {case}, lane {i} of {at:?}");
+        }
+    }
+}

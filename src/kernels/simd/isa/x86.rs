@@ -1,6 +1,6 @@
 //! AVX2 and AVX-512. Single rays meet eight children with AVX2 in both.
 
-use super::{Isa, Lanes, Work};
+use super::{Isa, Lanes, MOST, Work};
 use crate::kernels::simd::wide::x86::{Eight, Sixteen};
 use crate::kernels::trace::node::{FramedRay, NodeHits, UNIT};
 use bricks::Node;
@@ -30,7 +30,77 @@ impl Avx512 {
 }
 
 isa_over_intrinsics!(Avx2, Eight, Eight);
-isa_over_intrinsics!(Avx512, Sixteen, Eight);
+isa_over_intrinsics!(
+    Avx512, Sixteen, Eight;
+
+    isa_over_intrinsics!(fn columns(rows: &[&[f32; 4]; MOST]) -> [Sixteen; 4] {
+        let [a, b, c, d] = columns(rows);
+        [Sixteen::of(a), Sixteen::of(b), Sixteen::of(c), Sixteen::of(d)]
+    });
+    isa_over_intrinsics!(fn rows(columns: [Sixteen; 4], to: &mut [[f32; 4]; MOST]) -> () {
+        let [a, b, c, d] = columns;
+        rows([a.register(), b.register(), c.register(), d.register()], to)
+    });
+    isa_over_intrinsics!(fn pick(from: &[f32; 64], at: &[u32]) -> Sixteen { Sixteen::of(pick(from, at)) });
+);
+
+/// Of four matrices side by side, of four rows and columns each, the columns as rows.
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq")]
+fn turned([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    let (low, high) =
+        ([_mm512_unpacklo_ps(a, b), _mm512_unpacklo_ps(c, d)], [_mm512_unpackhi_ps(a, b), _mm512_unpackhi_ps(c, d)]);
+    [
+        _mm512_shuffle_ps::<0b01_00_01_00>(low[0], low[1]),
+        _mm512_shuffle_ps::<0b11_10_11_10>(low[0], low[1]),
+        _mm512_shuffle_ps::<0b01_00_01_00>(high[0], high[1]),
+        _mm512_shuffle_ps::<0b11_10_11_10>(high[0], high[1]),
+    ]
+}
+
+#[inline]
+#[target_feature(enable = "avx2,avx512f,avx512dq")]
+fn columns(rows: &[&[f32; 4]; MOST]) -> [__m512; 4] {
+    let every_fourth = |k: usize| {
+        let x = _mm512_castps128_ps512(vector(rows[k]));
+        let x = _mm512_insertf32x4::<1>(x, vector(rows[4 + k]));
+        let x = _mm512_insertf32x4::<2>(x, vector(rows[8 + k]));
+        _mm512_insertf32x4::<3>(x, vector(rows[12 + k]))
+    };
+    turned([every_fourth(0), every_fourth(1), every_fourth(2), every_fourth(3)])
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq")]
+fn rows(columns: [__m512; 4], to: &mut [[f32; 4]; MOST]) {
+    let rows = turned(columns);
+    for k in 0..4 {
+        let every_fourth = [
+            _mm512_castps512_ps128(rows[k]),
+            _mm512_extractf32x4_ps::<1>(rows[k]),
+            _mm512_extractf32x4_ps::<2>(rows[k]),
+            _mm512_extractf32x4_ps::<3>(rows[k]),
+        ];
+        for i in 0..4 {
+            // SAFETY: there is room for four numbers.
+            unsafe { _mm_storeu_ps(to[4 * i + k].as_mut_ptr(), every_fourth[i]) }
+        }
+    }
+}
+
+#[inline]
+#[target_feature(enable = "avx512f,avx512dq")]
+fn pick(from: &[f32; 64], at: &[u32]) -> __m512 {
+    let at = &at[..MOST];
+    // SAFETY: all words, and all numbers from those places on, are there.
+    let (at, [a, b, c, d]) = unsafe {
+        let quarter = |k: usize| _mm512_loadu_ps(from[16 * k..].as_ptr());
+        (_mm512_loadu_si512(at.as_ptr().cast()), [quarter(0), quarter(1), quarter(2), quarter(3)])
+    };
+    // Each looks at the lowest five bits.
+    let (low, high) = (_mm512_permutex2var_ps(a, at, b), _mm512_permutex2var_ps(c, at, d));
+    _mm512_mask_blend_ps(_mm512_test_epi32_mask(at, _mm512_set1_epi32(32)), low, high)
+}
 
 #[inline(always)]
 fn prefetch_line(at: *const u8) {

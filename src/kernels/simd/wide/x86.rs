@@ -135,6 +135,23 @@ fn blend_512(bits: u32, yes: __m512, no: __m512) -> __m512 {
     _mm512_mask_blend_ps(bits as u16, no, yes)
 }
 
+impl Sixteen {
+    /// Of numbers in a register.
+    ///
+    /// # Safety
+    /// The processor has the instructions.
+    #[inline(always)]
+    pub unsafe fn of(x: __m512) -> Self {
+        Self(x)
+    }
+
+    /// The register.
+    #[inline(always)]
+    pub fn register(self) -> __m512 {
+        self.0
+    }
+}
+
 over_intrinsics!(
     Sixteen,
     __m512,
