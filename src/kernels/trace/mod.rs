@@ -13,6 +13,7 @@ pub mod levels;
 pub mod node;
 pub mod opacity;
 pub mod packet;
+pub mod packet_fill;
 pub mod packet_flat;
 pub mod packet_node;
 pub mod packet_surface;

@@ -141,11 +141,11 @@ impl Facts {
             right |= same;
         }
         for v in 0..self.count.div_ceil(lanes) {
-            let mut wrong = !self.follow(isa, v) & (u32::MAX >> (32 - lanes));
+            let used = lanes.min(self.count - v * lanes);
+            let mut wrong = !self.follow(isa, v) & (u32::MAX >> (32 - used));
             while wrong != 0 {
-                let at = v * lanes + wrong.trailing_zeros() as usize;
+                right &= !self.rays[(v * lanes + wrong.trailing_zeros() as usize) % RAYS];
                 wrong &= wrong - 1;
-                right &= if at < self.count { !self.rays[at % RAYS] } else { u64::MAX };
             }
         }
         right

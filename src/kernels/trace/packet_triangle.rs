@@ -294,9 +294,10 @@ impl Seen {
             corners,
         );
         for k in 0..3 {
-            for i in 0..3 {
-                corners[i][k].store(&mut self.corners[i][k]);
-            }
+            let [a, b, c] = &mut self.corners;
+            corners[0][k].store(&mut a[k]);
+            corners[1][k].store(&mut b[k]);
+            corners[2][k].store(&mut c[k]);
             ends[0][k].store(&mut self.ends[0][k]);
             ends[1][k].store(&mut self.ends[1][k]);
         }

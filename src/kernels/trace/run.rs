@@ -3,7 +3,8 @@
 
 use super::levels::set_pending;
 use super::node::octant;
-use super::packet::{Known, Packet, RAYS, Taken, four_of_square};
+use super::packet::{Packet, RAYS};
+use super::packet_fill::{Known, Taken, four_of_square};
 use super::packet_walk::PacketScratch;
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
