@@ -6,6 +6,7 @@
 //! these sums in f64: the error is that of one batch, γ₆₃ < 4 · 10⁻⁶, however many there are.
 
 pub use crate::kernels::layout::BATCH_SAMPLES;
+use crate::kernels::vector::each;
 use rayon::prelude::*;
 
 /// The samples of a frame so far.
@@ -38,9 +39,9 @@ impl Accumulation {
     /// f64 would be rounded to, as 53 ≥ 2 · 24 + 2 (Figueroa, "When is Double Rounding Innocuous?", 1995).
     pub fn mean(&self) -> Vec<[f32; 3]> {
         if self.sums.is_empty() {
-            return self.first.par_iter().map(|sum| [0, 1, 2].map(|k| sum[k] / sum[3].max(1.0))).collect();
+            return self.first.par_iter().map(|sum| each(|k| sum[k] / sum[3].max(1.0))).collect();
         }
-        self.sums.par_iter().map(|sum| [0, 1, 2].map(|k| (sum[k] / sum[3].max(1.0)) as f32)).collect()
+        self.sums.par_iter().map(|sum| each(|k| (sum[k] / sum[3].max(1.0)) as f32)).collect()
     }
 }
 

@@ -151,7 +151,8 @@ impl<'a> AttributeView<'a> {
 
     /// The corners of a triangle.
     pub fn corners(&self, triangle: u32) -> [AttributeVertex; 3] {
-        self.indices.of(triangle).map(|index| self.vertices[index as usize])
+        let ([a, b, c], vertex) = (self.indices.of(triangle), |index: u32| self.vertices[index as usize]);
+        [vertex(a), vertex(b), vertex(c)]
     }
 
     /// What the corners of a triangle have besides, where they have.

@@ -49,6 +49,8 @@ pub fn xyz(v: [f32; 4]) -> Vec3 {
 }
 
 /// WGSL's `unpack4x8unorm`.
+#[inline(always)]
 pub fn unpack4x8unorm(word: u32) -> [f32; 4] {
-    word.to_le_bytes().map(|b| f32::from(b) / 255.0)
+    let ([a, b, c, d], unit) = (word.to_le_bytes(), |byte: u8| f32::from(byte) / 255.0);
+    [unit(a), unit(b), unit(c), unit(d)]
 }

@@ -65,7 +65,8 @@ pub fn srgb8(linear: f32) -> u8 {
 /// [`srgb8`] of whole pixels.
 pub fn pixels(linear: &[[f32; 3]]) -> Vec<[u8; 3]> {
     let (thresholds, passed) = (&*THRESHOLDS, &PASSED[..]);
-    let bytes = |&[r, g, b]: &[f32; 3]| [r, g, b].map(|x| by_table(thresholds, passed, x));
+    let byte = |x: f32| by_table(thresholds, passed, x);
+    let bytes = |&[r, g, b]: &[f32; 3]| [byte(r), byte(g), byte(b)];
     linear.par_iter().with_min_len(4096).map(bytes).collect()
 }
 

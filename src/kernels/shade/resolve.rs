@@ -146,7 +146,7 @@ fn read(
     let color = if a.color & b.color & c.color == u32::MAX {
         [blend(1.0, 1.0, 1.0); 3]
     } else {
-        let [a, b, c] = [a, b, c].map(|v| unpack4x8unorm(v.color));
+        let (a, b, c) = (unpack4x8unorm(a.color), unpack4x8unorm(b.color), unpack4x8unorm(c.color));
         each(|k| blend(a[k], b[k], c[k]))
     };
     let mut n = if is_stretched { normal } else { turned(normal) };
