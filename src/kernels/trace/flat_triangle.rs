@@ -55,12 +55,11 @@ impl BrickRay<'_> {
             [sa, sb, sc],
             #[inline(always)]
             || {
-                let [low, high] = ends(
+                ends(
                     #[inline(always)]
                     |x| isa.eight(x),
                     [a, b, c],
-                );
-                [low, high]
+                )
             },
             &rays,
             lanes,

@@ -153,7 +153,7 @@ pub struct Packet {
     pub t_min: Column,
     /// Distances of the hits.
     pub t: Column,
-    /// [`Surface::pending`].
+    /// [`crate::kernels::layout::Surface::pending`].
     pub pending: Words,
     /// Greatest magnitude of the origin's components.
     pub reach: Column,

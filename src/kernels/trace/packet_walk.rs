@@ -271,19 +271,19 @@ impl PacketScratch {
     /// Tests a group of triangles, each with rays of its own.
     #[inline(always)]
     fn test_triangles<I: Isa>(&mut self, isa: I, r: &BrickRay, group: Group, testing: &[u64; 32], any_hit: bool) {
-        let (mut triangles, mut is_nearer) = (group.bits, false);
-        if let Some(flat) = r.brick.flat
-            && self.packet.bounds.is_point
-        {
-            triangles = 0;
-            is_nearer = self.test_seen(isa, (r, flat), group, testing, any_hit);
-        }
-        while triangles != 0 {
-            let bit = triangles.trailing_zeros();
-            triangles &= triangles - 1;
-            let rays = testing[bit as usize] & !self.packet.done;
-            is_nearer |= self.packet.test_triangle(isa, r, group.base + bit, rays, any_hit);
-        }
+        let is_nearer = match r.brick.flat {
+            Some(flat) if self.packet.bounds.is_point => self.test_seen(isa, (r, flat), group, testing, any_hit),
+            _ => {
+                let (mut triangles, mut is_nearer) = (group.bits, false);
+                while triangles != 0 {
+                    let bit = triangles.trailing_zeros();
+                    triangles &= triangles - 1;
+                    let rays = testing[bit as usize] & !self.packet.done;
+                    is_nearer |= self.packet.test_triangle(isa, r, group.base + bit, rays, any_hit);
+                }
+                is_nearer
+            }
+        };
         if is_nearer {
             self.packet.shorten(isa);
         }
