@@ -154,8 +154,9 @@ def run(words: Sequence[str] | None = None) -> int:
     options, rest = parser().parse_known_args(words)
     if options.command == "convert" and rest:
         parser().error(f"convert has no {rest[0]}; see brickwalk-cluster convert --help")
-    # What it says of a scheduler that went away is many lines; ours is one.
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
+    # What these say of a scheduler that went away, the latter if something was being sent, is many lines; ours is one.
+    for name in ("distributed.client", "distributed.batched"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         shares_cores = options.command in ("walk", "convert")
         with Cluster(options.scheduler, options.workers, shares_cores=shares_cores) as cluster:
