@@ -3,13 +3,14 @@
 
 use super::wanted::{First, enter_root};
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT, Surface};
+use crate::kernels::layout::{NONE, PARAM_ANY_HIT, PARAM_NEEDED, PARAM_NEXT};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::spread_of;
 use crate::kernels::trace::node::{entered_children, framed_ray};
+use crate::kernels::trace::packet_fill::Written;
 use crate::kernels::trace::packet_walk::PacketScratch;
 use crate::kernels::trace::run::{PacketKernel, Wants, Work, for_each_ray, run_for_each_packet};
 use crate::kernels::trace::scratch::Scratch;
@@ -68,7 +69,7 @@ impl PacketKernel for Query<'_> {
 
     /// Their limits are no hits.
     #[inline(always)]
-    fn write<I: Isa>(&self, _: I, _: &mut PacketScratch, _: &mut [Hit], _: &mut [Surface], _: &[u32]) {}
+    fn write<I: Isa>(&self, _: I, _: &mut PacketScratch, _: &mut Written) {}
 }
 
 /// What a ray needed, its hit being final.

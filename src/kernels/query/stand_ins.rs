@@ -3,13 +3,14 @@
 
 use super::query_all::{STAND_INS, ask};
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, INSTANCE_IDENTITY, PARAM_ANY_HIT, Surface};
+use crate::kernels::layout::{INSTANCE_IDENTITY, PARAM_ANY_HIT, Surface};
 use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::PairCounts;
 use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::{is_pending, set_pending};
 use crate::kernels::trace::node::inner_before;
+use crate::kernels::trace::packet_fill::Written;
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::{PacketScratch, put, take, top_group};
 use crate::kernels::trace::run::{PacketKernel, Wants, Work, for_each_ray, run_for_each_packet};
@@ -92,16 +93,9 @@ impl PacketKernel for Askers<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(
-        &self,
-        _: I,
-        packets: &mut PacketScratch,
-        _: &mut [Hit],
-        surfaces: &mut [Surface],
-        places: &[u32],
-    ) {
-        for (i, &at) in places.iter().enumerate() {
-            set_pending(&mut surfaces[at as usize], packets.packet.done >> i & 1 != 0);
+    fn write<I: Isa>(&self, _: I, packets: &mut PacketScratch, to: &mut Written) {
+        for (i, &at) in to.places.iter().enumerate() {
+            set_pending(&mut to.surfaces[at as usize], packets.packet.done >> i & 1 != 0);
         }
     }
 }

@@ -5,7 +5,7 @@
 use super::query_all::TOP_STACK_SIZE;
 use crate::kernels::bound::{Bound, entry_bits};
 use crate::kernels::layout::{
-    COUNTER_PAIRS_VISIBLE, COUNTER_STACK_OVERFLOW, Hit, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEXT, Surface,
+    COUNTER_PAIRS_VISIBLE, COUNTER_STACK_OVERFLOW, INSTANCE_IDENTITY, NONE, PARAM_ANY_HIT, PARAM_NEXT,
 };
 use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
@@ -16,6 +16,7 @@ use crate::kernels::trace::leaf::BrickRay;
 use crate::kernels::trace::levels::set_pending;
 use crate::kernels::trace::node::{entered_children, inner_before};
 use crate::kernels::trace::packet::{Column, Packet, RAYS, Words};
+use crate::kernels::trace::packet_fill::Written;
 use crate::kernels::trace::packet_node::Place;
 use crate::kernels::trace::packet_walk::{Entries, PacketScratch, Waiting};
 use crate::kernels::trace::run::{PacketKernel, Wants, Work, run_for_each_packet};
@@ -86,16 +87,9 @@ impl PacketKernel for Both<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(
-        &self,
-        isa: I,
-        packets: &mut PacketScratch,
-        hits: &mut [Hit],
-        surfaces: &mut [Surface],
-        places: &[u32],
-    ) {
-        self.intersect.write(isa, packets, hits, surfaces, places);
-        self.wanted.write(isa, packets, hits, surfaces, places);
+    fn write<I: Isa>(&self, isa: I, packets: &mut PacketScratch, to: &mut Written) {
+        self.intersect.write(isa, packets, to);
+        self.wanted.write(isa, packets, to);
     }
 }
 
@@ -126,16 +120,9 @@ impl PacketKernel for Wanted<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(
-        &self,
-        _: I,
-        packets: &mut PacketScratch,
-        _: &mut [Hit],
-        surfaces: &mut [Surface],
-        places: &[u32],
-    ) {
-        for (i, &at) in places.iter().enumerate() {
-            set_pending(&mut surfaces[at as usize], packets.packet.asking >> i & 1 != 0);
+    fn write<I: Isa>(&self, _: I, packets: &mut PacketScratch, to: &mut Written) {
+        for (i, &at) in to.places.iter().enumerate() {
+            set_pending(&mut to.surfaces[at as usize], packets.packet.asking >> i & 1 != 0);
         }
     }
 }

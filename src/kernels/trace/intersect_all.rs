@@ -3,12 +3,13 @@
 //! leaves, the bricks.
 
 use super::node::inner_before;
+use super::packet_fill::Written;
 use super::packet_node::Place;
 use super::packet_walk::{PacketScratch, put, take, top_group};
 use super::run::{PacketKernel, Wants, Work, run_for_each_packet};
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, PARAM_ANY_HIT, Surface};
+use crate::kernels::layout::PARAM_ANY_HIT;
 use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::PairCounts;
@@ -117,14 +118,7 @@ impl<const SELECT: bool> PacketKernel for IntersectAll<'_, SELECT> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(
-        &self,
-        isa: I,
-        packets: &mut PacketScratch,
-        hits: &mut [Hit],
-        surfaces: &mut [Surface],
-        places: &[u32],
-    ) {
-        packets.write(isa, self.bound, hits, surfaces, places);
+    fn write<I: Isa>(&self, isa: I, packets: &mut PacketScratch, to: &mut Written) {
+        packets.write(isa, self.bound, to);
     }
 }

@@ -1,11 +1,12 @@
 //! Intersects rays of one octant with a run of the selected leaves of their tile, in their order: twin of
 //! `shaders/trace/intersect_list.wgsl`.
 
+use super::packet_fill::Written;
 use super::packet_walk::PacketScratch;
 use super::run::{PacketKernel, Wants, Work, run_for_each_packet};
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Entry, Hit, PARAM_ANY_HIT, Surface};
+use crate::kernels::layout::{Entry, PARAM_ANY_HIT};
 use crate::kernels::rays::RaySet;
 use crate::kernels::simd::isa::Isa;
 use crate::kernels::tiles::TileLists;
@@ -61,14 +62,7 @@ impl PacketKernel for IntersectList<'_> {
     }
 
     #[inline(always)]
-    fn write<I: Isa>(
-        &self,
-        isa: I,
-        packets: &mut PacketScratch,
-        hits: &mut [Hit],
-        surfaces: &mut [Surface],
-        places: &[u32],
-    ) {
-        packets.write(isa, self.bound, hits, surfaces, places);
+    fn write<I: Isa>(&self, isa: I, packets: &mut PacketScratch, to: &mut Written) {
+        packets.write(isa, self.bound, to);
     }
 }

@@ -23,6 +23,16 @@ pub struct Known<'a> {
     pub surfaces: &'a [Surface],
 }
 
+/// Where what the rays of a packet have found is written.
+pub struct Written<'a> {
+    /// Hits of a band.
+    pub hits: &'a mut [Hit],
+    /// Their surfaces.
+    pub surfaces: &'a mut [Surface],
+    /// Where those of each ray of the packet lie in both.
+    pub places: &'a [u32],
+}
+
 /// What is seen of rays as a packet takes them, a bit each.
 #[derive(Clone, Copy, Default)]
 pub struct Taken {

@@ -3,6 +3,7 @@
 //! kernel carries out in integers, are written alone.
 
 use super::packet::{Column, Packet, RAYS, Words};
+use super::packet_fill::Written;
 use super::packet_walk::PacketScratch;
 use super::walk_brick::write_found;
 use crate::kernels::bound::Bound;
@@ -247,9 +248,10 @@ fn offset<I: Isa>(isa: I, p: I::Wide, step: I::Wide, down: u32) -> I::Wide {
 }
 
 impl PacketScratch {
-    /// Writes what ray i has found to the i-th of `places`.
+    /// Writes what ray i has found to the i-th of the places.
     #[inline(always)]
-    pub fn write<I: Isa>(&mut self, isa: I, bound: &Bound, hits: &mut [Hit], surfaces: &mut [Surface], places: &[u32]) {
+    pub fn write<I: Isa>(&mut self, isa: I, bound: &Bound, to: &mut Written) {
+        let Written { hits, surfaces, places } = to;
         let packet = &self.packet;
         let has_found = |i: usize| packet.found.leaf.0[i % RAYS] != NONE;
         if bound.has(PARAM_ANY_HIT) {

@@ -4,7 +4,7 @@
 use super::levels::set_pending;
 use super::node::octant;
 use super::packet::{Packet, RAYS};
-use super::packet_fill::{Known, Taken, four_of_square};
+use super::packet_fill::{Known, Taken, Written, four_of_square};
 use super::packet_walk::PacketScratch;
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
@@ -243,15 +243,8 @@ pub trait PacketKernel: Sync {
     /// Runs it for the rays of the packet, which are of the tile; what they find stays with them.
     fn run_packet<I: Isa>(&self, isa: I, scratch: &mut Scratch, packets: &mut PacketScratch, tile: usize);
 
-    /// Writes what ray i of the packet has found to the i-th of `places`.
-    fn write<I: Isa>(
-        &self,
-        isa: I,
-        packets: &mut PacketScratch,
-        hits: &mut [Hit],
-        surfaces: &mut [Surface],
-        places: &[u32],
-    );
+    /// Writes what ray i of the packet has found to the i-th of the places.
+    fn write<I: Isa>(&self, isa: I, packets: &mut PacketScratch, to: &mut Written);
 }
 
 /// Edge of the blocks whose rays are made packets of, those that go in much the same direction together.
@@ -329,7 +322,8 @@ fn run_block<I: Isa, K: PacketKernel>(
         let places = &groups.places[..groups.count];
         kernel.run_packet(isa, &mut task.scratch, &mut packets, block.tile);
         packets.count(bound, &mut task.scratch.tally);
-        kernel.write(isa, &mut packets, band.hits, band.surfaces, places);
+        let to = &mut Written { hits: band.hits, surfaces: band.surfaces, places };
+        kernel.write(isa, &mut packets, to);
     }
     (task.packets, task.groups) = (Some(packets), Some(groups));
 }
