@@ -3,7 +3,7 @@
 //!
 //! A few triangles that are much larger than the others of their part would make its box, and with it the number of
 //! rays that need it, as large as themselves. They are taken out of all parts and make up parts of their own. Rays meet
-//! these as well, so the part has to get cheaper by half.
+//! these as well, so the part has to get cheaper by a multiple.
 //!
 //! Where the cut goes depends on the triangles alone, not on how many a brick may hold, so parts for different limits
 //! are levels of one tree. That tree cut at [`CANONICAL_TRIANGLES`] gives the extents from which the lattice follows.
@@ -26,9 +26,6 @@ const TASK_ITEMS: usize = 1 << 12;
 
 /// A side of a cut holds at least this part of the items, which bounds the depth and keeps bricks filled.
 const LEAST_SIDE: usize = 16;
-
-/// How many times cheaper a part must get for its large items to be taken out.
-const LARGE_GAIN: f64 = 2.0;
 
 /// How many times smaller parts of large items are.
 const LARGE_PARTS: usize = 64;
@@ -110,6 +107,13 @@ impl Rule {
     pub fn of_large(self) -> Self {
         Self { limit: self.limit.div_ceil(LARGE_PARTS), is_object: false }
     }
+
+    /// How many times cheaper a part must get for its large items to be taken out: rays that meet a part of large items
+    /// walk down its levels as well.
+    fn large_gain(self) -> f64 {
+        let levels = self.of_large().limit.next_power_of_two().ilog2().div_ceil(bricks::NODE_WIDTH.ilog2());
+        1.0 + f64::from(levels.max(1))
+    }
 }
 
 /// What items were cut into.
@@ -139,7 +143,7 @@ pub(crate) fn cut(items: &mut [Item], rule: Rule) -> Cuts {
         rest = after;
     }
     let finish = |slice: &mut [Item]| {
-        let kept = if rule.is_object { move_large_to_end(slice) } else { slice.len() };
+        let kept = if rule.is_object { move_large_to_end(slice, rule.large_gain()) } else { slice.len() };
         let mut order: Vec<u32> = slice[..kept].iter().map(|item| item.index).collect();
         order.sort_unstable();
         (order, slice[kept..].to_vec())
@@ -174,9 +178,8 @@ struct Parts {
     extents: Vec<f64>,
 }
 
-/// Moves the items without which the others are at least [`LARGE_GAIN`] times cheaper to the end; returns how many
-/// stay.
-fn move_large_to_end(items: &mut [Item]) -> usize {
+/// Moves the items without which the others are at least `gain` times cheaper to the end; returns how many stay.
+fn move_large_to_end(items: &mut [Item], gain: f64) -> usize {
     let most = items.len() / LEAST_SIDE;
     if most == 0 {
         return items.len();
@@ -196,7 +199,7 @@ fn move_large_to_end(items: &mut [Item]) -> usize {
     // The last of the cheapest: as few items as possible are moved.
     let (cost, kept) =
         costs.into_iter().fold((f64::INFINITY, 0), |best, next| if next.0 <= best.0 { next } else { best });
-    if cost * LARGE_GAIN <= items.len() as f64 * all { kept } else { items.len() }
+    if cost * gain <= items.len() as f64 * all { kept } else { items.len() }
 }
 
 fn descend(items: &mut [Item], first: usize, limit: usize, mut is_brick: bool, mut is_chunk: bool) -> Parts {
@@ -490,6 +493,18 @@ mod tests {
         let few = scattered(20_000);
         let before = cut(&mut few.clone(), Rule { limit: 1000, is_object: false });
         assert_eq!(check(&few, 1000).order, before.order, "without large items nothing changes");
+    }
+
+    #[test]
+    fn parts_of_more_levels_have_to_gain_more() {
+        let gains = [1, 64, 200, 512, 513, 4096, 16384, 1 << 20];
+        let gains = gains.map(|limit| Rule { limit, is_object: true }.large_gain());
+        assert_eq!(gains, [2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 4.0, 6.0]);
+        // 30 without which 1000 others are 4.9 times cheaper.
+        let mut items = scattered(1000);
+        items.extend((1000..1030).map(|index| Item { min: [0.0; 3], max: [60.5, 60.5, 0.0], index }));
+        let kept = [2.0, 4.0, 6.0].map(|gain| move_large_to_end(&mut items.clone(), gain));
+        assert_eq!(kept, [1000, 1000, 1030]);
     }
 
     #[test]
