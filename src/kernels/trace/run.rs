@@ -8,7 +8,10 @@ use super::packet_fill::{Known, Taken, Written, four_of_square};
 use super::packet_walk::PacketScratch;
 use super::scratch::Scratch;
 use crate::kernels::bound::Bound;
-use crate::kernels::layout::{Hit, Ray, Surface, T_INFINITE, TileList};
+use crate::kernels::layout::{
+    Hit, PARAM_ANY_HIT, PARAM_BOUNCE, PARAM_CULLED, PARAM_EMITTER, PARAM_ENVIRONMENT, Ray, Surface, T_INFINITE,
+    TileList,
+};
 use crate::kernels::rays::{RaySet, Slot};
 use crate::kernels::simd::isa::{self, Isa};
 use rayon::prelude::*;
@@ -58,7 +61,7 @@ struct Task {
     groups: Option<Box<Groups>>,
 }
 
-/// A rectangle of rays that lies in one tile and in one band.
+/// A rectangle of rays that lies in one band, and in one tile where tiles differ.
 struct Block {
     tile: usize,
     /// The first row of its band in the set.
@@ -154,7 +157,8 @@ impl Band<'_> {
     }
 }
 
-/// Calls `visit` for the blocks of `work`, of at most so many rows and columns: bands of rows in parallel.
+/// Calls `visit` for the blocks of `work`, of at most so many rows and columns: bands of rows in parallel. Unless tiles
+/// are chosen, or have pairs of their own that are culled, blocks may reach over several.
 fn for_each_block(
     set: &mut RaySet,
     bound: &Bound,
@@ -164,7 +168,9 @@ fn for_each_block(
 ) {
     let [width, tile_edge, tiles_x] = [bound.params.width, bound.params.tile, bound.params.tiles_x].map(|x| x as usize);
     // Tiles are powers of two of at least 8.
-    let (rows, columns) = (rows.min(tile_edge), columns.min(tile_edge));
+    let tiles_differ = !matches!(work, Work::All) || bound.has(PARAM_CULLED);
+    let rows = rows.min(tile_edge);
+    let columns = if tiles_differ { columns.min(tile_edge) } else { columns };
     let band = rows * width;
     let RaySet { rays, hits, surfaces, waiting } = set;
     let bands = rays.par_chunks(band).zip(hits.par_chunks_mut(band)).zip(surfaces.par_chunks_mut(band));
@@ -247,7 +253,8 @@ pub trait PacketKernel: Sync {
     fn write<I: Isa>(&self, isa: I, packets: &mut PacketScratch, to: &mut Written);
 }
 
-/// Edge of the blocks whose rays are made packets of, those that go in much the same direction together.
+/// Edge of the blocks whose rays are made packets of, those that go in much the same direction together. Lower ones are
+/// as much wider.
 const PACKET_BLOCK: usize = 64;
 /// Rays of such a block.
 const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
@@ -255,8 +262,12 @@ const BLOCK_RAYS: usize = PACKET_BLOCK * PACKET_BLOCK;
 const BANDS: usize = 8;
 /// Steps of a direction's components along x and y within its octant, a power of two, by which rays are sorted.
 const STEPS: usize = 4;
-/// Cells of directions: octants by steps.
-const CELLS: usize = 8 * STEPS * STEPS;
+/// Steps along either axis across the direction of parallel rays, a power of two, by which these are sorted.
+const START_STEPS: usize = 16;
+/// Cells of an octant: of directions, or of places where rays begin.
+const OCTANT_CELLS: usize = START_STEPS * START_STEPS;
+/// Cells of all octants.
+const CELLS: usize = 8 * OCTANT_CELLS;
 /// So many rays of a square of 8 x 8 go together if they are of one octant; others wait for those of their octant in
 /// the block.
 const LEAST_SQUARE: usize = 16;
@@ -316,7 +327,7 @@ fn run_block<I: Isa, K: PacketKernel>(
     let Some(wants) = kernel.wants(block.tile) else { return };
     let mut packets = task.packets.take().unwrap_or_default();
     let mut groups = task.groups.take().unwrap_or_default();
-    groups.clear();
+    groups.begin(Order::of(bound));
     let width = bound.params.width as usize;
     while groups.next::<I, K>(isa, &wants, (band, &block, width), &mut packets.packet) {
         let places = &groups.places[..groups.count];
@@ -328,17 +339,40 @@ fn run_block<I: Isa, K: PacketKernel>(
     (task.packets, task.groups) = (Some(packets), Some(groups));
 }
 
-/// Takes the rays of a block by groups of an octant: those of a square of 8 x 8 where they are of one, then the others,
-/// sorted by their directions.
+/// By what rays of an octant are sorted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    /// By where they lead, but for those of squares that are of one octant: neighbours begin close to each other.
+    Direction,
+    /// By where they begin, seen along their direction: rays to the sun from what bounces met. They are parallel but for
+    /// its disc, and neighbours in the picture may begin far from each other.
+    Start,
+}
+
+impl Order {
+    #[inline(always)]
+    fn of(bound: &Bound) -> Self {
+        let to_sun = bound.has(PARAM_ANY_HIT) && !bound.has(PARAM_EMITTER) && !bound.has(PARAM_ENVIRONMENT);
+        if to_sun && bound.has(PARAM_BOUNCE) { Self::Start } else { Self::Direction }
+    }
+}
+
+/// Takes the rays of a block by groups of an octant: those of a square of 8 x 8 where they are of one and the order
+/// allows it, then the others, sorted.
 struct Groups {
+    order: Order,
     /// The square that is looked at next.
     square: usize,
-    /// Rays that wait for others of their octant, and the cells of their directions.
-    waiting: [(u32, u8); BLOCK_RAYS],
-    /// The same by cells, once there are no more squares.
+    /// Rays that wait for others of their octant.
+    waiting: [u32; BLOCK_RAYS],
+    /// How many.
+    count_waiting: usize,
+    /// Their cells,
+    cells: [u16; BLOCK_RAYS],
+    /// and they by cells, once there are no more squares.
     sorted: [u32; BLOCK_RAYS],
-    /// How many of them are of each cell.
-    counts: [usize; CELLS],
+    /// How many of them lie in the octants up to each.
+    ends: [usize; 8],
     /// How many have been taken.
     taken: usize,
     /// The group: the places of its rays.
@@ -348,32 +382,72 @@ struct Groups {
 
 impl Default for Groups {
     fn default() -> Self {
-        let (waiting, sorted, places) = ([(0, 0); BLOCK_RAYS], [0; BLOCK_RAYS], [0; RAYS]);
-        Self { square: 0, waiting, sorted, counts: [0; CELLS], taken: 0, count: 0, places }
+        let (waiting, cells, sorted) = ([0; BLOCK_RAYS], [0; BLOCK_RAYS], [0; BLOCK_RAYS]);
+        let (order, ends, places) = (Order::Direction, [0; 8], [0; RAYS]);
+        Self { order, square: 0, waiting, count_waiting: 0, cells, sorted, ends, taken: 0, count: 0, places }
     }
 }
 
-/// The cell of a ray: the octant of its direction, and in that along a Z-order curve. What rays meet that end soon
-/// depends on where they begin, so of these the octant is all.
+/// The first cell of a ray's octant.
 #[inline(always)]
-fn cell_of(ray: &Ray) -> u8 {
-    let first = octant(ray.direction) as usize % 8 * STEPS * STEPS;
+fn octant_cell(ray: &Ray) -> usize {
+    octant(ray.direction) as usize % 8 * OCTANT_CELLS
+}
+
+/// The cell of a pair of steps, along a Z-order curve.
+#[inline(always)]
+fn z_order([x, y]: [usize; 2]) -> usize {
+    let spread = |i: usize| i & 1 | (i & 2) << 1 | (i & 4) << 2 | (i & 8) << 3;
+    spread(x) + 2 * spread(y)
+}
+
+/// The cell of a ray by its direction: its octant, and in that along a curve. What rays meet that end soon depends on
+/// where they begin, so of these the octant is all.
+#[inline(always)]
+fn cell_of_direction(ray: &Ray) -> usize {
     if ray.t_max < T_INFINITE {
-        return first as u8;
+        return octant_cell(ray);
     }
     let m = ray.direction.map(f32::abs);
     let per_sum = STEPS as f32 / (m[0] + m[1] + m[2]);
     // Casts saturate; what is no number is 0.
     let step = |x: f32| ((x * per_sum) as usize).min(STEPS - 1);
-    let (x, y) = (step(m[0]), step(m[1]));
-    let spread = |i: usize| i & 1 | (i & 2) << 1;
-    (first + spread(x) + 2 * spread(y)) as u8
+    octant_cell(ray) + z_order([step(m[0]), step(m[1])])
+}
+
+/// The cells of the rays at `waiting` by where they begin, on a grid over all of them that lies across the direction of
+/// the first.
+fn cells_of_starts(rays: &[Ray], waiting: &[u32], cells: &mut [u16]) {
+    let Some(&first) = waiting.first() else { return };
+    let d = rays[first as usize].direction;
+    let m = d.map(f32::abs);
+    let k = (1..3).fold(0, |k, axis| if m[axis] > m[k] { axis } else { k });
+    let across = [(k + 1) % 3, (k + 2) % 3];
+    let slopes = across.map(|axis| d[axis] / d[k]);
+    let start = |at: u32| -> [f32; 2] {
+        let o = rays[at as usize].origin;
+        std::array::from_fn(|i| o[across[i]] - o[k] * slopes[i])
+    };
+    let (mut least, mut most) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for &at in waiting {
+        let p = start(at);
+        for i in 0..2 {
+            (least[i], most[i]) = (least[i].min(p[i]), most[i].max(p[i]));
+        }
+    }
+    let scale: [f32; 2] = std::array::from_fn(|i| START_STEPS as f32 / (most[i] - least[i]));
+    for (cell, &at) in cells.iter_mut().zip(waiting) {
+        let p = start(at);
+        // As above.
+        let step = |i: usize| (((p[i] - least[i]) * scale[i]) as usize).min(START_STEPS - 1);
+        *cell = (octant_cell(&rays[at as usize]) + z_order([step(0), step(1)])) as u16;
+    }
 }
 
 impl Groups {
     /// Begins with a block.
-    fn clear(&mut self) {
-        (self.square, self.counts, self.taken) = (0, [0; CELLS], 0);
+    fn begin(&mut self, order: Order) {
+        (self.order, self.square, self.count_waiting, self.taken) = (order, 0, 0, 0);
     }
 
     /// Has a packet take the rays of a square, but for those that are known not to be pending: which of them are
@@ -446,7 +520,8 @@ impl Groups {
             if wanted == 0 {
                 continue;
             }
-            let octant = taken.octant(wanted).filter(|_| wanted.count_ones() as usize >= LEAST_SQUARE);
+            let together = self.order == Order::Direction && wanted.count_ones() as usize >= LEAST_SQUARE;
+            let octant = taken.octant(wanted).filter(|_| together);
             if wanted != packet.all() || octant.is_none() {
                 let all = self.places;
                 self.count = 0;
@@ -462,21 +537,16 @@ impl Groups {
                 packet.seal(isa, octant);
                 return true;
             }
-            let waiting: usize = self.counts.iter().sum();
-            for i in 0..self.count {
-                let place = self.places[i % RAYS];
-                let cell = cell_of(&band.rays[place as usize]);
-                self.waiting[(waiting + i) % BLOCK_RAYS] = (place, cell);
-                self.counts[cell as usize % CELLS] += 1;
+            for &place in &self.places[..self.count.min(RAYS)] {
+                self.waiting[self.count_waiting % BLOCK_RAYS] = place;
+                self.count_waiting += 1;
             }
         }
         if self.square == block.squares() {
-            self.sort();
+            self.sort(band.rays);
             self.square += 1;
         }
-        let mut end = 0;
-        for (octant, counts) in self.counts.chunks(CELLS / 8).enumerate() {
-            end += counts.iter().sum::<usize>();
+        for (octant, end) in self.ends.into_iter().enumerate() {
             if self.taken < end {
                 self.count = (end - self.taken).min(RAYS);
                 self.places[..self.count].copy_from_slice(&self.sorted[self.taken..self.taken + self.count]);
@@ -489,17 +559,95 @@ impl Groups {
         false
     }
 
-    /// Sorts the rays that wait by cells.
-    fn sort(&mut self) {
-        let mut next = [0; CELLS];
-        for cell in 1..CELLS {
-            next[cell] = next[cell - 1] + self.counts[cell - 1];
+    /// Sorts the rays that wait, of `rays`, by cells.
+    fn sort(&mut self, rays: &[Ray]) {
+        let waiting = &self.waiting[..self.count_waiting.min(BLOCK_RAYS)];
+        let cells = &mut self.cells[..waiting.len()];
+        match self.order {
+            Order::Direction => {
+                for (cell, &at) in cells.iter_mut().zip(waiting) {
+                    *cell = cell_of_direction(&rays[at as usize]) as u16;
+                }
+            }
+            Order::Start => cells_of_starts(rays, waiting, cells),
         }
-        let waiting: usize = self.counts.iter().sum();
-        for &(at, cell) in &self.waiting[..waiting] {
+        // How many are of each cell, then where those of each go.
+        let mut next = [0; CELLS];
+        for &cell in &*cells {
+            next[cell as usize % CELLS] += 1;
+        }
+        let mut end = 0;
+        for (octant, next) in next.chunks_mut(OCTANT_CELLS).enumerate() {
+            for next in next {
+                (*next, end) = (end, end + *next);
+            }
+            self.ends[octant] = end;
+        }
+        for (&at, &cell) in waiting.iter().zip(&*cells) {
             let to = &mut next[cell as usize % CELLS];
             self.sorted[*to % BLOCK_RAYS] = at;
             *to += 1;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rays along `direction` from points that a hash strews over a cube.
+    fn strewn(count: u32, direction: [f32; 3]) -> Vec<Ray> {
+        let coordinate = |i: u32| crate::math::sampling::pcg(i) as f32 / u32::MAX as f32;
+        let origin = |i: u32| [3 * i, 3 * i + 1, 3 * i + 2].map(coordinate);
+        (0..count).map(|i| Ray { origin: origin(i), t_min: 0.0, direction, t_max: T_INFINITE }).collect()
+    }
+
+    /// The places of the rays by groups, as packets take them, and what of the square across the direction the groups
+    /// of 64 cover on average.
+    fn sorted(rays: &[Ray], order: Order) -> (Vec<u32>, f32) {
+        let mut groups = Groups { order, count_waiting: rays.len(), ..Groups::default() };
+        (0..rays.len()).for_each(|i| groups.waiting[i] = i as u32);
+        groups.sort(rays);
+        assert_eq!(groups.ends[7], rays.len());
+        let places = groups.sorted[..rays.len()].to_vec();
+        let d = rays[0].direction;
+        let across = |at: u32, axis: usize| {
+            let o = rays[at as usize].origin;
+            o[axis] - o[1] * d[axis] / d[1]
+        };
+        let extent = |group: &[u32], axis: usize| {
+            let of = |f: fn(f32, f32) -> f32, from| group.iter().fold(from, |x, &at| f(x, across(at, axis)));
+            of(f32::max, f32::NEG_INFINITY) - of(f32::min, f32::INFINITY)
+        };
+        let area = |group: &[u32]| extent(group, 0) * extent(group, 2);
+        let all = area(&places);
+        let groups = places.chunks(RAYS);
+        (places.clone(), groups.clone().map(|group| area(group) / all).sum::<f32>() / groups.len() as f32)
+    }
+
+    #[test]
+    fn rays_to_the_sun_that_begin_close_to_each_other_go_together() {
+        let rays = strewn(4096, [0.3, 0.9, -0.2]);
+        let (mut places, share) = sorted(&rays, Order::Start);
+        // A 64th at best.
+        assert!(share < 0.06, "{share}");
+        places.sort_unstable();
+        assert!(places.into_iter().eq(0..4096));
+        // The direction of all is the same, so that by it they stay as they are.
+        let (places, share) = sorted(&rays, Order::Direction);
+        assert!(share > 0.5, "{share}");
+        assert!(places.into_iter().eq(0..4096));
+    }
+
+    #[test]
+    fn rays_that_begin_at_one_point_or_nowhere_are_sorted_as_well() {
+        for origin in [[7.0; 3], [f32::NAN; 3], [f32::INFINITY; 3]] {
+            let rays: Vec<Ray> = strewn(100, [0.0, -1.0, 0.0]).into_iter().map(|ray| Ray { origin, ..ray }).collect();
+            assert!(sorted(&rays, Order::Start).0.into_iter().eq(0..100));
+        }
+        let still: Vec<Ray> = strewn(100, [0.0; 3]);
+        let mut places = sorted(&still, Order::Start).0;
+        places.sort_unstable();
+        assert!(places.into_iter().eq(0..100));
     }
 }
