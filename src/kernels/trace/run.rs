@@ -344,8 +344,8 @@ fn run_block<I: Isa, K: PacketKernel>(
 enum Order {
     /// By where they lead, but for those of squares that are of one octant: neighbours begin close to each other.
     Direction,
-    /// By where they begin, seen along their direction: rays to the sun from what bounces met. They are parallel but for
-    /// its disc, and neighbours in the picture may begin far from each other.
+    /// By where they begin, seen along their direction: rays to the sun from what bounces met. They are parallel but
+    /// for its disc, and neighbours in the picture may begin far from each other.
     Start,
 }
 
