@@ -415,11 +415,10 @@ fn cell_of_direction(ray: &Ray) -> usize {
     octant_cell(ray) + z_order([step(m[0]), step(m[1])])
 }
 
-/// The cells of the rays at `waiting` by where they begin, on a grid over all of them that lies across the direction of
-/// the first.
+/// The cells of the rays at `waiting`, of one or more, by where they begin, on a grid over all of them that lies across
+/// the direction of the first.
 fn cells_of_starts(rays: &[Ray], waiting: &[u32], cells: &mut [u16]) {
-    let Some(&first) = waiting.first() else { return };
-    let d = rays[first as usize].direction;
+    let d = rays[waiting[0] as usize].direction;
     let m = d.map(f32::abs);
     let k = (1..3).fold(0, |k, axis| if m[axis] > m[k] { axis } else { k });
     let across = [(k + 1) % 3, (k + 2) % 3];
@@ -561,6 +560,10 @@ impl Groups {
 
     /// Sorts the rays that wait, of `rays`, by cells.
     fn sort(&mut self, rays: &[Ray]) {
+        if self.count_waiting == 0 {
+            self.ends = [0; 8];
+            return;
+        }
         let waiting = &self.waiting[..self.count_waiting.min(BLOCK_RAYS)];
         let cells = &mut self.cells[..waiting.len()];
         match self.order {
